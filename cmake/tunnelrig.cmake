@@ -1,0 +1,25 @@
+# Warnings, sanitizers, and the one function that makes a folder a library.
+
+add_library(tunnelrig_options INTERFACE)
+target_compile_options(tunnelrig_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror
+  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual>
+  # gcc 12 warns of designated initialisers that leave defaulted members out, which is what they are for
+  -Wno-missing-field-initializers)
+if(TUNNELRIG_SANITIZE)
+  target_compile_options(tunnelrig_options INTERFACE
+    -fsanitize=${TUNNELRIG_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(tunnelrig_options INTERFACE -fsanitize=${TUNNELRIG_SANITIZE})
+endif()
+
+# Headers stand beside their sources and are included as "folder/name.h". So that CMake, not good manners, keeps
+# dependencies one way, each folder is seen through an include directory of its own that holds a link to it alone.
+function(tunnelrig_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS;PRIVATE_LIBRARIES" ${ARGN})
+  set(seen ${CMAKE_BINARY_DIR}/include/${name})
+  file(MAKE_DIRECTORY ${seen})
+  file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR} ${seen}/${name} SYMBOLIC)
+  add_library(${name} STATIC ${arg_SOURCES})
+  target_include_directories(${name} PUBLIC ${seen})
+  target_link_libraries(${name} PUBLIC ${arg_DEPENDS} PRIVATE tunnelrig_options ${arg_PRIVATE_LIBRARIES})
+endfunction()

@@ -1,0 +1,277 @@
+#include "datasets/campaign_folder.h"
+
+#include "datasets/error.h"
+#include "datasets/npy.h"
+#include "datasets/statistics_store.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <future>
+#include <system_error>
+
+#include <unistd.h>
+
+namespace tunnelrig {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kChunk_s = 0.1;  // no blob holds more
+
+struct FolderText {
+  CampaignInfo info;
+  Sheet runs, calibration;
+  std::optional<Sheet> propellers;
+  std::vector<Run> parsed_runs;
+};
+
+Sheet read_sheet(const fs::path& folder, const std::string& name) {
+  Sheet sheet = read_csv(folder / name);
+  sheet.file = name;
+  return sheet;
+}
+
+FolderText read_folder_text(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error))
+    throw InputError::in(folder.string(), "there is no such campaign folder");
+  for (const char* name : {"campaign.toml", "calibration.csv", "runs.csv"}) {
+    if (!fs::exists(folder / name, error))
+      throw InputError::in(folder.string(), "the file {} is missing", name);
+  }
+  FolderText text;
+  text.info = parse_campaign_toml(read_text(folder / "campaign.toml"), "campaign.toml");
+  text.calibration = read_sheet(folder, "calibration.csv");
+  parse_calibration(text.calibration, text.info.rig.rotors);
+  if (fs::exists(folder / "propellers.csv", error)) {
+    text.propellers = read_sheet(folder, "propellers.csv");
+    parse_propellers(*text.propellers, text.info.rig.rotors);
+  }
+  text.runs = read_sheet(folder, "runs.csv");
+  text.parsed_runs = parse_runs(text.runs, text.info);
+  if (text.parsed_runs.empty()) throw InputError::in("runs.csv", "holds no run");
+  return text;
+}
+
+fs::path raw_path(const fs::path& folder, const Run& run) {
+  const fs::path relative(run.raw);
+  const bool escapes =
+      relative.is_absolute() ||
+      std::any_of(relative.begin(), relative.end(), [](const fs::path& part) { return part == ".."; });
+  if (escapes) {
+    throw InputError::at("runs.csv", run.line, "column raw: '{}' must be a path inside the campaign folder",
+                         run.raw);
+  }
+  std::error_code error;
+  if (!fs::is_regular_file(folder / relative, error)) {
+    throw InputError::at("runs.csv", run.line, "run {}: the raw file {} is missing", run.run, run.raw);
+  }
+  return folder / relative;
+}
+
+fs::path gaps_path(fs::path raw) { return raw.replace_extension(".gaps.csv"); }
+
+std::vector<Gap> read_gaps(const fs::path& path, std::uint64_t frames) {
+  std::error_code error;
+  if (!fs::exists(path, error)) return {};
+  const Sheet sheet = read_csv(path);
+  std::vector<Gap> gaps;
+  for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
+    const double first = sheet.require_number(row, "first_frame");
+    const double lost = sheet.require_number(row, "frames_lost");
+    if (first != std::floor(first) || first < 0 || first > static_cast<double>(frames) ||
+        (!gaps.empty() && first < static_cast<double>(gaps.back().first_frame))) {
+      throw InputError(fmt::format("{}: {:g} is no frame index from 0 to {}, in ascending order",
+                                   sheet.where(row, "first_frame"), first, frames));
+    }
+    if (lost != std::floor(lost) || lost < 1 || lost > 1e15) {
+      throw InputError(fmt::format("{}: {:g} is no whole number of frames, 1 or more",
+                                   sheet.where(row, "frames_lost"), lost));
+    }
+    gaps.push_back({static_cast<std::uint64_t>(first), static_cast<std::uint64_t>(lost),
+                    sheet.text(row, "cause"), sheet.text(row, "estimated") == "1"});
+  }
+  return gaps;
+}
+
+template <typename Float>
+void check_finite(std::span<const std::byte> data, int channels, const std::string& file) {
+  for (std::size_t i = 0; i < data.size() / sizeof(Float); ++i) {
+    Float value;
+    std::memcpy(&value, data.data() + i * sizeof(Float), sizeof(Float));
+    if (std::isfinite(value)) continue;
+    const auto wide = static_cast<std::size_t>(channels);
+    throw InputError::in(file, "frame {}, channel {} is {}; every voltage must be a finite number", i / wide,
+                         i % wide + 1, static_cast<double>(value));
+  }
+}
+
+void check_samples(const NpyFile& npy, const CampaignInfo& info, const Run& run) {
+  if (npy.frames() == 0)
+    throw InputError::at("runs.csv", run.line, "run {}: {} holds zero frames", run.run, run.raw);
+  if (npy.format().channels < info.rig.rotors) {
+    throw InputError::at("runs.csv", run.line, "run {}: {} has {} channels for {} rotors", run.run, run.raw,
+                         npy.format().channels, info.rig.rotors);
+  }
+  if (npy.format().type == SampleType::kFloat32)
+    check_finite<float>(npy.data(), npy.format().channels, run.raw);
+  if (npy.format().type == SampleType::kFloat64)
+    check_finite<double>(npy.data(), npy.format().channels, run.raw);
+}
+
+/// What the numbers of a run show that its bytes do not.
+void check_statistics(const RunStatistics& statistics, const CampaignInfo& info, const RawFormat& format,
+                      const Run& run, bool allow_stuck) {
+  const double top_V = info.daq.highest_count() * info.daq.volts_per_count();
+  for (std::size_t c = 0; c < static_cast<std::size_t>(info.rig.rotors); ++c) {
+    const ChannelStatistics& channel = statistics.channels[c];
+    if (is_counts(format.type) && (channel.lowest_V < 0 || channel.highest_V > top_V)) {
+      throw InputError::at(
+          "runs.csv", run.line,
+          "run {}: channel {} of {} leaves the converter's range of {} bits (0 to {} counts)", run.run, c + 1,
+          run.raw, info.daq.adc_bits, info.daq.highest_count());
+    }
+    if (channel.stuck() && run.kind == RunKind::kThrust && !allow_stuck) {
+      throw InputError::at(
+          "runs.csv", run.line,
+          "run {}: channel {} of {} is stuck at {:g} V for the whole run; take the run out of runs.csv, "
+          "or import with --allow-stuck to keep it marked",
+          run.run, c + 1, run.raw, channel.lowest_V);
+    }
+  }
+}
+
+void play(std::span<const std::byte> data, std::size_t frame_size, std::span<const Gap> gaps,
+          FrameSink& sink) {
+  std::uint64_t at = 0;
+  for (const Gap& gap : gaps) {
+    sink.frames(data.subspan(at * frame_size, (gap.first_frame - at) * frame_size));
+    sink.gap(gap);
+    at = gap.first_frame;
+  }
+  sink.frames(data.subspan(at * frame_size));
+}
+
+/// Stores one raw run; its statistics are computed beside on another core.
+void import_raw_run(CampaignFile& file, const fs::path& folder, const CampaignInfo& info, const Run& run,
+                    const ImportOptions& options, ImportSummary& summary) {
+  const fs::path path = raw_path(folder, run);
+  const NpyFile npy(path);
+  check_samples(npy, info, run);
+  const std::vector<Gap> gaps = read_gaps(gaps_path(path), npy.frames());
+  const RawFormat format = npy.format();
+
+  auto summarizer = options.summarizer(info, format);
+  auto summed =
+      std::async(std::launch::async, [&] { play(npy.data(), format.frame_size(), gaps, *summarizer); });
+  const auto chunk_frames = static_cast<std::size_t>(kChunk_s * info.daq.sample_rate_hz);
+  RawWriter writer(file, run.run, format, chunk_frames);
+  play(npy.data(), format.frame_size(), gaps, writer);
+  const std::string hash = writer.finish(RunState::kComplete, {});
+  summed.get();
+  const RunStatistics statistics = summarizer->finish(hash);
+  check_statistics(statistics, info, format, run, options.allow_stuck);
+  store_statistics(file, writer.id(), statistics);
+  summary.raw_runs += 1;
+  summary.frames += npy.frames();
+  summary.raw_bytes += npy.data().size();
+}
+
+/// Writes a stored run as .npy while it is read.
+class NpySink : public FrameSink {
+ public:
+  NpySink(const fs::path& path, const RawRun& run) : out_(path, std::ios::binary) {
+    out_ << format_npy_header(run.format, run.frames);
+  }
+  void frames(std::span<const std::byte> data) override {
+    out_.write(reinterpret_cast<const char*>(data.data()), static_cast<std::streamsize>(data.size()));
+  }
+  void gap(const Gap& gap) override { gaps_.push_back(gap); }
+  bool close() {
+    out_.close();
+    return out_.good();
+  }
+  const std::vector<Gap>& gaps() const { return gaps_; }
+
+ private:
+  std::ofstream out_;
+  std::vector<Gap> gaps_;
+};
+
+Sheet gap_sheet(const std::vector<Gap>& gaps) {
+  Sheet sheet{.file = "", .columns = {"first_frame", "frames_lost", "cause", "estimated"}, .rows = {}};
+  for (const Gap& gap : gaps) {
+    sheet.rows.push_back({{fmt::format("{}", gap.first_frame), fmt::format("{}", gap.frames_lost), gap.cause,
+                           gap.estimated ? "1" : "0"},
+                          0});
+  }
+  return sheet;
+}
+
+void export_raw_run(const CampaignFile& file, const RawRun& raw, const fs::path& path) {
+  fs::create_directories(path.parent_path());
+  NpySink sink(path, raw);
+  read_raw(file, raw, sink);
+  if (!sink.close())
+    throw StorageError(fmt::format("{}: cannot be written; is the disk full?", path.string()), true);
+  if (!sink.gaps().empty()) write_text(gaps_path(path), format_csv(gap_sheet(sink.gaps())));
+}
+
+void write_folder(const CampaignFile& file, const fs::path& folder, const Progress& progress) {
+  write_text(folder / "campaign.toml", file.info().toml);
+  const Sheet no_points{.file = "", .columns = {"cell", "applied_force_N", "voltage_V"}, .rows = {}};
+  write_text(folder / "calibration.csv", format_csv(file.sheet("calibration").value_or(no_points)));
+  for (const char* name : {"runs", "propellers"}) {
+    if (const auto sheet = file.sheet(name))
+      write_text(folder / fmt::format("{}.csv", name), format_csv(*sheet));
+  }
+  const std::vector<Run> runs = file.runs();
+  std::size_t done = 0;
+  for (const Run& run : runs) {
+    if (const auto raw = raw_run(file, run.run)) export_raw_run(file, *raw, folder / run.raw);
+    if (progress) progress(++done, runs.size());
+  }
+}
+
+}  // namespace
+
+ImportSummary import_campaign_folder(const fs::path& folder, const fs::path& file,
+                                     const ImportOptions& options) {
+  const FolderText text = read_folder_text(folder);
+  StagedCampaign staged(file, options.replace);
+  CampaignFile& campaign = staged.file();
+  campaign.set_text("campaign.toml", text.info.toml);
+  campaign.set_sheet("calibration", text.calibration);
+  if (text.propellers) campaign.set_sheet("propellers", *text.propellers);
+  campaign.set_sheet("runs", text.runs);
+  ImportSummary summary{.runs = text.parsed_runs.size()};
+  std::size_t done = 0;
+  for (const Run& run : text.parsed_runs) {
+    if (!run.raw.empty()) import_raw_run(campaign, folder, text.info, run, options, summary);
+    if (options.progress) options.progress(++done, text.parsed_runs.size());
+  }
+  staged.publish();
+  return summary;
+}
+
+void export_campaign_folder(const CampaignFile& file, const fs::path& folder, const Progress& progress) {
+  std::error_code error;
+  if (fs::exists(folder, error) && !(fs::is_directory(folder, error) && fs::is_empty(folder, error))) {
+    throw InputError::in(folder.string(), "exists and is not an empty folder; export never overwrites");
+  }
+  const fs::path staged = folder.string() + fmt::format(".{}.part", ::getpid());
+  fs::remove_all(staged, error);
+  fs::create_directories(staged, error);
+  if (error) throw InputError::in(folder.string(), "cannot be written: {}", error.message());
+  try {
+    write_folder(file, staged, progress);
+    fs::rename(staged, folder);
+  } catch (...) {
+    fs::remove_all(staged, error);
+    throw;
+  }
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,152 @@
+#include <cmath>
+#include <numbers>
+
+#define TOML_EXCEPTIONS 1
+#include "datasets/campaign.h"
+#include "datasets/error.h"
+
+#include <toml++/toml.h>
+
+namespace tunnelrig {
+namespace {
+
+constexpr std::string_view kFormat = "tunnelrig-campaign/1";
+
+/// Typed access to one table of a document, with the file and line in every message.
+class Section {
+ public:
+  Section(const toml::table& document, std::string_view name, const std::string& file)
+      : name_(name), file_(file) {
+    const toml::node* node = document.get(name);
+    if (node == nullptr) return;
+    table_ = node->as_table();
+    line_ = static_cast<int>(node->source().begin.line);
+    if (table_ == nullptr) throw InputError::at(file_, line_, "{} is no table; write [{}]", name, name);
+  }
+
+  bool exists() const { return table_ != nullptr; }
+
+  /// The number under `key`, which must lie in [lowest, highest] of `unit`; nothing where it is absent.
+  std::optional<double> number(std::string_view key, double lowest, double highest,
+                               std::string_view unit) const {
+    const toml::node* node = table_ != nullptr ? table_->get(key) : nullptr;
+    if (node == nullptr) return {};
+    const auto line = static_cast<int>(node->source().begin.line);
+    const auto value = node->value<double>();
+    if (!value || !std::isfinite(*value)) {
+      throw InputError::at(file_, line, "{}.{} is not a number", name_, key);
+    }
+    if (*value < lowest || *value > highest) {
+      throw InputError::at(file_, line, "{}.{} = {:g}: must lie between {:g} and {:g} {}", name_, key, *value,
+                           lowest, highest, unit);
+    }
+    return value;
+  }
+
+  double required(std::string_view key, double lowest, double highest, std::string_view unit) const {
+    if (const auto value = number(key, lowest, highest, unit)) return *value;
+    throw InputError::at(file_, line_, "{}.{} [{}] is required", name_, key, unit);
+  }
+
+ private:
+  const toml::table* table_ = nullptr;
+  std::string name_;
+  const std::string& file_;
+  int line_ = 1;
+};
+
+toml::table parse_document(const std::string& text, const std::string& file) {
+  try {
+    return toml::parse(text, file);
+  } catch (const toml::parse_error& error) {
+    throw InputError::at(file, static_cast<int>(error.source().begin.line), "{}", error.description());
+  }
+}
+
+Rig parse_rig(const Section& section) {
+  Rig rig;
+  const double rotors = section.number("rotors", 1, kMaxRotors, "rotors").value_or(kMaxRotors);
+  rig.rotors = static_cast<int>(std::lround(rotors));
+  rig.propeller_radius_m = section.required("propeller_radius_m", 0.005, 5, "m");
+  const double disc = std::numbers::pi * rig.propeller_radius_m * rig.propeller_radius_m;
+  rig.rotor_area_m2 = section.number("rotor_area_m2", 1e-5, 400, "m²").value_or(disc);
+  rig.nominal_speed_rpm = section.required("nominal_speed_rpm", 1, 200000, "rev/min");
+  rig.arm_length_m = section.number("arm_length_m", 0, 50, "m").value_or(0);
+  rig.vehicle_width_m = section.number("vehicle_width_m", 0, 100, "m").value_or(0);
+  rig.vehicle_height_m = section.number("vehicle_height_m", 0, 100, "m").value_or(0);
+  rig.blade_chord_m = section.number("blade_chord_m", 1e-4, 2, "m").value_or(0);
+  return rig;
+}
+
+Daq parse_daq(const Section& section) {
+  Daq daq;
+  daq.sample_rate_hz = section.number("sample_rate_hz", 1, 1e6, "Hz").value_or(daq.sample_rate_hz);
+  daq.adc_bits =
+      static_cast<int>(std::lround(section.number("adc_bits", 1, 16, "bits").value_or(daq.adc_bits)));
+  daq.adc_reference_V = section.number("adc_reference_V", 0.01, 100, "V").value_or(daq.adc_reference_V);
+  return daq;
+}
+
+}  // namespace
+
+double Daq::volts_per_count() const { return std::ldexp(adc_reference_V, -adc_bits); }
+int Daq::highest_count() const { return (1 << adc_bits) - 1; }
+
+CampaignInfo parse_campaign_toml(const std::string& text, const std::string& file) {
+  const toml::table document = parse_document(text, file);
+  const auto format = document["format"].value<std::string>();
+  if (!format) throw InputError::at(file, 1, "the key format is required (format = \"{}\")", kFormat);
+  if (*format != kFormat) {
+    throw InputError::at(file, static_cast<int>(document["format"].node()->source().begin.line),
+                         "format is \"{}\"; this program reads \"{}\"", *format, kFormat);
+  }
+  CampaignInfo info;
+  info.toml = text;
+  info.name = document["name"].value<std::string>().value_or("");
+  const Section rig(document, "rig", file);
+  if (!rig.exists()) throw InputError::at(file, 1, "the table [rig] is required");
+  info.rig = parse_rig(rig);
+  const Section tunnel(document, "tunnel", file);
+  if (tunnel.exists()) {
+    info.tunnel =
+        Tunnel{tunnel.required("width_m", 0.05, 1000, "m"), tunnel.required("height_m", 0.05, 1000, "m")};
+    if (info.tunnel->width_m <= info.rig.vehicle_width_m ||
+        info.tunnel->height_m <= info.rig.vehicle_height_m) {
+      throw InputError::in(file, "the vehicle ({} × {} m) does not fit the tunnel ({} × {} m)",
+                           info.rig.vehicle_width_m, info.rig.vehicle_height_m, info.tunnel->width_m,
+                           info.tunnel->height_m);
+    }
+  }
+  info.daq = parse_daq(Section(document, "daq", file));
+  const Section uncertainty(document, "uncertainty", file);
+  info.uncertainty = {.speed_rpm = uncertainty.number("speed_rpm", 0, 10000, "rev/min"),
+                      .air_temperature_K = uncertainty.number("air_temperature_K", 0, 100, "K"),
+                      .air_pressure_Pa = uncertainty.number("air_pressure_Pa", 0, 50000, "Pa"),
+                      .force_N = uncertainty.number("force_N", 0, 1000, "N")};
+  return info;
+}
+
+std::string reference_campaign_toml() {
+  return R"(format = "tunnelrig-campaign/1"
+name = "static thrust in the 1.5 m tunnel"
+
+[rig]
+propeller_radius_m = 0.1524   # HQProp 12x6
+arm_length_m = 0.31           # R_q
+vehicle_width_m = 0.743       # w_q, tip to tip: 2 (0.31 cos 45 deg + 0.1524)
+vehicle_height_m = 0.30       # h_q
+nominal_speed_rpm = 5000.0
+blade_chord_m = 0.025         # at 0.5 R
+
+[tunnel]
+width_m = 1.5
+height_m = 1.5
+
+[daq]
+sample_rate_hz = 1333.3333333333333
+adc_bits = 12
+adc_reference_V = 3.3
+)";
+}
+
+}  // namespace tunnelrig

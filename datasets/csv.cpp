@@ -1,0 +1,245 @@
+#include "datasets/csv.h"
+
+#include "datasets/error.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include <unistd.h>
+
+namespace tunnelrig {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
+/// Splits CSV text into records of cells; one call of `record` reads up to the end of one record.
+class Scanner {
+ public:
+  Scanner(std::string_view text, const std::string& file) : text_(text), file_(file) {}
+
+  bool at_end() const { return at_ == text_.size(); }
+  int line() const { return line_; }
+
+  std::vector<std::string> record() {
+    std::vector<std::string> cells;
+    do {
+      cells.push_back(cell());
+    } while (take(','));
+    take('\r');
+    if (!take('\n') && !at_end()) {
+      throw InputError::at(file_, line_, "text after a closing quote; a quote inside a cell is doubled");
+    }
+    ++line_;
+    return cells;
+  }
+
+ private:
+  bool take(char wanted) {
+    if (at_end() || text_[at_] != wanted) return false;
+    ++at_;
+    return true;
+  }
+
+  std::string cell() {
+    if (!take('"')) {
+      const auto end = std::min(text_.find_first_of(",\n", at_), text_.size());
+      std::string_view cell = text_.substr(at_, end - at_);
+      if (cell.ends_with('\r') && (end == text_.size() || text_[end] == '\n')) cell.remove_suffix(1);
+      at_ = end;
+      return std::string(cell);
+    }
+    const int opened = line_;
+    std::string cell;
+    while (true) {
+      if (at_end()) throw InputError::at(file_, opened, "a quote is opened here and never closed");
+      const char c = text_[at_++];
+      if (c == '"' && !take('"')) return cell;
+      if (c == '\n') ++line_;
+      cell.push_back(c);
+    }
+  }
+
+  std::string_view text_;
+  const std::string& file_;
+  std::size_t at_ = 0;
+  int line_ = 1;
+};
+
+/// The length of the UTF-8 sequence at the start of `text`; 0 where it is none (RFC 3629, without the
+/// overlong forms' fine print: what matters is that the text can be stored and shown).
+std::size_t utf8_length(std::string_view text) {
+  const auto first = static_cast<unsigned char>(text[0]);
+  const std::size_t length = first < 0x80                    ? 1
+                             : first >= 0xC2 && first < 0xE0 ? 2
+                             : first >= 0xE0 && first < 0xF0 ? 3
+                             : first >= 0xF0 && first < 0xF5 ? 4
+                                                             : 0;
+  if (length == 0 || text.size() < length) return 0;
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((static_cast<unsigned char>(text[i]) & 0xC0) != 0x80) return 0;
+  }
+  return length;
+}
+
+void check_encoding(std::string_view text, const std::string& file) {
+  int line = 1;
+  while (!text.empty()) {
+    const std::size_t length = utf8_length(text);
+    if (length == 0) throw InputError::at(file, line, "this is not UTF-8 text");
+    if (text[0] == '\0') throw InputError::at(file, line, "this is not a text file (it holds a byte 0)");
+    if (text[0] == '\n') ++line;
+    text.remove_prefix(length);
+  }
+}
+
+void check_header(const Sheet& sheet) {
+  for (std::size_t i = 0; i < sheet.columns.size(); ++i) {
+    if (std::find(sheet.columns.begin(), sheet.columns.begin() + static_cast<std::ptrdiff_t>(i),
+                  sheet.columns[i]) != sheet.columns.begin() + static_cast<std::ptrdiff_t>(i) &&
+        !sheet.columns[i].empty()) {
+      throw InputError::at(sheet.file, 1, "column {} stands twice in the header", sheet.columns[i]);
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<double> parse_number(std::string_view text) {
+  text = trimmed(text);
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return {};
+  return value;
+}
+
+std::optional<std::size_t> Sheet::find(std::string_view column) const {
+  const auto found = std::find(columns.begin(), columns.end(), column);
+  if (found == columns.end()) return {};
+  return static_cast<std::size_t>(found - columns.begin());
+}
+
+std::size_t Sheet::require(std::string_view column) const {
+  if (const auto found = find(column)) return *found;
+  throw InputError::at(file, 1, "the required column {} is missing", column);
+}
+
+std::size_t Sheet::ensure(std::string_view column) {
+  if (const auto found = find(column)) return *found;
+  columns.emplace_back(column);
+  for (Row& row : rows) row.cells.emplace_back();
+  return columns.size() - 1;
+}
+
+const std::string& Sheet::text(std::size_t row, std::string_view column) const {
+  static const std::string empty;
+  const auto index = find(column);
+  return index ? rows[row].cells[*index] : empty;
+}
+
+std::string Sheet::where(std::size_t row, std::string_view column) const {
+  return fmt::format("{}:{}: column {}", file, rows[row].line, column);
+}
+
+std::optional<double> Sheet::number(std::size_t row, std::string_view column) const {
+  const std::string& cell = text(row, column);
+  if (trimmed(cell).empty()) return {};
+  if (const auto value = parse_number(cell)) return value;
+  throw InputError(fmt::format("{}: '{}' is not a finite decimal number (not recorded: leave it empty)",
+                               where(row, column), cell));
+}
+
+double Sheet::require_number(std::size_t row, std::string_view column) const {
+  require(column);
+  if (const auto value = number(row, column)) return *value;
+  throw InputError(fmt::format("{}: a number is required here", where(row, column)));
+}
+
+int Sheet::require_integer(std::size_t row, std::string_view column, int lowest, int highest) const {
+  const double value = require_number(row, column);
+  if (value != std::floor(value) || value < lowest || value > highest) {
+    throw InputError(fmt::format("{}: '{}' is not a whole number from {} to {}", where(row, column),
+                                 text(row, column), lowest, highest));
+  }
+  return static_cast<int>(value);
+}
+
+Sheet parse_csv(std::string_view text, const std::string& file) {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  check_encoding(text, file);
+  Sheet sheet{.file = file, .columns = {}, .rows = {}};
+  Scanner scanner(text, file);
+  if (scanner.at_end()) throw InputError::at(file, 1, "the file is empty; a header row is required");
+  sheet.columns = scanner.record();
+  for (std::string& column : sheet.columns) column = trimmed(column);
+  check_header(sheet);
+  while (!scanner.at_end()) {
+    const int line = scanner.line();
+    std::vector<std::string> cells = scanner.record();
+    if (cells.size() == 1 && trimmed(cells[0]).empty() && sheet.columns.size() > 1) continue;
+    if (cells.size() != sheet.columns.size()) {
+      throw InputError::at(file, line, "{} cells where the header has {} columns", cells.size(),
+                           sheet.columns.size());
+    }
+    sheet.rows.push_back({std::move(cells), line});
+  }
+  return sheet;
+}
+
+Sheet read_csv(const std::filesystem::path& path) { return parse_csv(read_text(path), path.string()); }
+
+std::string format_csv(const Sheet& sheet) {
+  std::string out;
+  const auto append = [&out](const std::vector<std::string>& cells) {
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (i > 0) out.push_back(',');
+      if (cells[i].find_first_of(",\"\r\n") == std::string::npos) {
+        out += cells[i];
+        continue;
+      }
+      out.push_back('"');
+      for (const char c : cells[i]) out.append(c == '"' ? 2 : 1, c);
+      out.push_back('"');
+    }
+    out.push_back('\n');
+  };
+  append(sheet.columns);
+  for (const Sheet::Row& row : sheet.rows) append(row.cells);
+  return out;
+}
+
+std::string read_text(const std::filesystem::path& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) {
+    throw InputError::in(path.string(), "is a folder where a file is expected");
+  }
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw InputError::in(path.string(), "cannot be read: {}", std::generic_category().message(errno));
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+void write_text(const std::filesystem::path& path, std::string_view text) {
+  std::filesystem::path partial = path;
+  partial += fmt::format(".{}.part", ::getpid());
+  std::ofstream out(partial, std::ios::binary);
+  out.write(text.data(), static_cast<std::streamsize>(text.size()));
+  out.close();
+  std::error_code error;
+  if (out) std::filesystem::rename(partial, path, error);
+  if (!out || error) {
+    const std::string reason = error ? error.message() : std::generic_category().message(errno);
+    std::filesystem::remove(partial, error);
+    throw InputError::in(path.string(), "cannot be written: {}", reason);
+  }
+}
+
+}  // namespace tunnelrig

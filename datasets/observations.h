@@ -1,0 +1,81 @@
+// Tables of observations from other rigs: any CSV, with a schema (docs/tables.md) that says what its columns
+// are.
+#pragma once
+
+#include "datasets/campaign_file.h"
+#include "datasets/csv.h"
+#include "datasets/units.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tunnelrig {
+
+/// A column and what it means.
+struct TableColumn {
+  std::string column;
+  std::string unit;
+  std::string meaning;  // a name the suite knows ("speed_rpm", "air_temperature_C", …); empty: a covariate
+                        // like any other
+};
+
+inline constexpr std::string_view kTableFormat = "tunnelrig-table/1";
+
+/// table.toml.
+struct TableSchema {
+  std::string name;
+  TableColumn response;             // meaning: thrust_N, c_t, c_t_helicopter, c_t_propeller, or empty
+  std::vector<std::string> groups;  // columns that together name a group, which has its own baseline
+  std::string blocks = "rows";      // a column, "rows", or "bins(column, n)"
+  std::string hold_out;             // expression over columns; empty: none
+  std::vector<TableColumn> covariates;
+  std::optional<std::string> speed_column;
+  double speed_factor = 1;  // 2 / pole count where the column holds electrical revolutions
+  std::optional<std::string> diameter_column;
+  double diameter_unit_m = 1;
+  std::optional<double> diameter_m;  // of all rows
+  double air_temperature_C = 15;     // of all rows, where no column says
+  double air_pressure_Pa = 101325;
+  std::string toml;
+};
+
+/// Throws InputError naming file, line and key.
+TableSchema parse_table_schema(const std::string& text, const std::string& file);
+
+/// One row, in SI (speeds in rev/min, temperatures in °C).
+struct Observation {
+  int line = 0;  // of the CSV
+  std::string group;
+  double response = 0;
+  std::optional<double> speed_rpm;
+  std::optional<double> diameter_m;
+  double air_temperature_C = 15;
+  double air_pressure_Pa = 101325;
+};
+
+struct ObservationTable {
+  TableSchema schema;
+  Sheet sheet;
+  std::vector<Observation> rows;
+};
+
+/// Checks a sheet against its schema and converts it. Throws InputError naming file, line and column.
+ObservationTable read_observations(const Sheet& sheet, const TableSchema& schema);
+
+/// The table that a campaign file holds; throws InputError where it holds none.
+ObservationTable observations_of(const CampaignFile& file);
+
+/// `import --format table`: any CSV with a schema. Returns the number of rows.
+std::size_t import_table(const std::filesystem::path& csv, const std::filesystem::path& schema,
+                         const std::filesystem::path& file, bool replace);
+
+/// Stores a sheet and its schema as a new campaign file, once they fit each other. Returns the number of
+/// rows.
+std::size_t store_table(const Sheet& sheet, const TableSchema& schema, const std::filesystem::path& file,
+                        bool replace);
+
+}  // namespace tunnelrig

@@ -1,0 +1,119 @@
+#include "datasets/rcbenchmark.h"
+
+#include "datasets/error.h"
+#include "datasets/observations.h"
+
+#include <algorithm>
+
+namespace tunnelrig {
+namespace {
+
+std::vector<std::filesystem::path> sweep_files(const std::filesystem::path& source) {
+  std::vector<std::filesystem::path> files;
+  std::error_code error;
+  if (!std::filesystem::is_directory(source, error)) return {source};
+  for (const auto& entry : std::filesystem::directory_iterator(source)) {
+    if (entry.path().extension() == ".csv") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  if (files.empty()) throw InputError::in(source.string(), "holds no .csv file");
+  return files;
+}
+
+/// The row of `sweeps` that speaks of `file`, or nothing.
+std::optional<std::size_t> sweep_row(const Sheet& sweeps, const std::string& file) {
+  for (std::size_t row = 0; row < sweeps.rows.size(); ++row) {
+    if (sweeps.text(row, "file") == file) return row;
+  }
+  return {};
+}
+
+void append_sweep(Sheet& all, const Sheet& sweep, const Sheet& sweeps, const std::string& file) {
+  const auto known = sweep_row(sweeps, file);
+  if (!sweeps.columns.empty() && !known) throw InputError::in(sweeps.file, "has no row for {}", file);
+  for (const Sheet::Row& row : sweep.rows) {
+    all.rows.push_back({std::vector<std::string>(all.columns.size()), row.line});
+    const auto put = [&all](const std::string& column, const std::string& text) {
+      if (column.empty()) return;
+      const std::size_t index = all.ensure(column);
+      all.rows.back().cells[index] = text;
+    };
+    put("file", file);
+    for (std::size_t c = 0; known && c < sweeps.columns.size(); ++c) {
+      put(sweeps.columns[c], sweeps.rows[*known].cells[c]);
+    }
+    for (std::size_t c = 0; c < sweep.columns.size(); ++c) put(sweep.columns[c], row.cells[c]);
+  }
+}
+
+bool has_nonzero(const Sheet& sheet, const std::string& column) {
+  for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
+    if (sheet.number(row, column).value_or(0) != 0) return true;
+  }
+  return false;
+}
+
+/// The first column whose header starts so and that is not all zero; an optical probe that was not fitted
+/// reads 0.
+std::optional<std::string> column_starting(const Sheet& sheet, std::string_view start) {
+  for (const std::string& column : sheet.columns) {
+    if (column.starts_with(start) && has_nonzero(sheet, column)) return column;
+  }
+  return {};
+}
+
+std::string column_toml(std::string_view section, const std::string& column, std::string_view meaning) {
+  return fmt::format("\n{}\ncolumn = \"{}\"\nunit = \"{}\"\n{}", section, column, unit_in_header(column),
+                     meaning.empty() ? "" : fmt::format("meaning = \"{}\"\n", meaning));
+}
+
+std::string sweep_schema(const Sheet& all, const SweepOptions& options, const std::string& source) {
+  const auto thrust = column_starting(all, "Thrust");
+  if (!thrust)
+    throw InputError::in(source, "no column Thrust (unit) with a value; is this an RCbenchmark sweep?");
+  auto speed = column_starting(all, "Motor Optical Speed");
+  if (!speed) speed = column_starting(all, "Motor Electrical Speed");
+  if (!speed)
+    throw InputError::in(source, "no column Motor Optical Speed or Motor Electrical Speed with a value");
+  const std::string group = all.find("group") ? "group" : "file";
+  std::string toml = fmt::format("format = \"{}\"\nname = \"{}\"\ngroups = [\"{}\"]\nblocks = \"file\"\n",
+                                 kTableFormat, std::filesystem::path(source).filename().string(), group);
+  toml += column_toml("[response]", *thrust, "thrust_N");
+  toml += column_toml("[speed]", *speed, "");
+  if (options.pole_count) toml += fmt::format("electrical = true\npole_count = {}\n", *options.pole_count);
+  if (all.find("propeller_diameter_m")) {
+    toml += "\n[propeller]\ndiameter_column = \"propeller_diameter_m\"\ndiameter_unit = \"m\"\n";
+  } else if (options.propeller_diameter_m) {
+    toml += fmt::format("\n[propeller]\ndiameter_m = {}\n", *options.propeller_diameter_m);
+  }
+  for (const auto& [start, meaning] :
+       {std::pair<std::string_view, std::string_view>{"Voltage", "supply_voltage_V"},
+        {"Current", ""},
+        {"ESC signal", ""},
+        {"Electrical Power", ""}}) {
+    if (const auto column = column_starting(all, start))
+      toml += column_toml("[[covariates]]", *column, meaning);
+  }
+  return toml;
+}
+
+}  // namespace
+
+std::size_t import_rcbenchmark(const std::filesystem::path& source, const std::filesystem::path& file,
+                               const SweepOptions& options) {
+  Sheet sweeps;
+  if (!options.sweeps_csv.empty()) {
+    sweeps = read_csv(options.sweeps_csv);
+    sweeps.require("file");
+  }
+  Sheet all{.file = source.string(), .columns = {"file"}, .rows = {}};
+  for (const auto& path : sweep_files(source))
+    append_sweep(all, read_csv(path), sweeps, path.filename().string());
+  const std::string toml =
+      options.schema.empty() ? sweep_schema(all, options, source.string()) : read_text(options.schema);
+  return store_table(
+      all, parse_table_schema(toml, options.schema.empty() ? "table.toml" : options.schema.string()), file,
+      options.replace);
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,92 @@
+#include "datasets/units.h"
+
+#include "datasets/error.h"
+
+#include <algorithm>
+#include <array>
+#include <numbers>
+
+namespace tunnelrig {
+namespace {
+
+constexpr double kGravity = 9.80665;   // m/s², standard
+constexpr double kPound = 0.45359237;  // kg
+constexpr double kPi = std::numbers::pi;
+
+constexpr std::array<Unit, 56> kUnits = {{
+    {"1", "number", 1, 0},
+    {"", "number", 1, 0},
+    {"%", "number", 0.01, 0},
+    {"N", "force", 1, 0},
+    {"mN", "force", 1e-3, 0},
+    {"gf", "force", kGravity * 1e-3, 0},
+    {"g", "force", kGravity * 1e-3, 0},
+    {"kgf", "force", kGravity, 0},
+    {"kg", "force", kGravity, 0},
+    {"lbf", "force", kPound* kGravity, 0},
+    {"ozf", "force", kPound* kGravity / 16, 0},
+    {"rpm", "speed", 1, 0},
+    {"RPM", "speed", 1, 0},
+    {"rev/min", "speed", 1, 0},
+    {"rev/s", "speed", 60, 0},
+    {"rps", "speed", 60, 0},
+    {"rad/s", "speed", 30 / kPi, 0},
+    {"m", "length", 1, 0},
+    {"cm", "length", 1e-2, 0},
+    {"mm", "length", 1e-3, 0},
+    {"in", "length", 0.0254, 0},
+    {"ft", "length", 0.3048, 0},
+    {"m2", "area", 1, 0},
+    {"degC", "temperature", 1, 0},
+    {"C", "temperature", 1, 0},
+    {"°C", "temperature", 1, 0},
+    {"ºC", "temperature", 1, 0},
+    {"K", "temperature", 1, -273.15},
+    {"degF", "temperature", 5.0 / 9, -160.0 / 9},
+    {"°F", "temperature", 5.0 / 9, -160.0 / 9},
+    {"Pa", "pressure", 1, 0},
+    {"hPa", "pressure", 100, 0},
+    {"mbar", "pressure", 100, 0},
+    {"kPa", "pressure", 1000, 0},
+    {"psi", "pressure", 6894.757293168, 0},
+    {"inHg", "pressure", 3386.389, 0},
+    {"kg/m3", "density", 1, 0},
+    {"V", "voltage", 1, 0},
+    {"mV", "voltage", 1e-3, 0},
+    {"counts", "number", 1, 0},
+    {"A", "current", 1, 0},
+    {"W", "power", 1, 0},
+    {"s", "time", 1, 0},
+    {"ms", "time", 1e-3, 0},
+    {"us", "time", 1e-6, 0},
+    {"µs", "time", 1e-6, 0},
+    {"min", "time", 60, 0},
+    {"h", "time", 3600, 0},
+    {"Hz", "frequency", 1, 0},
+    {"m/s", "velocity", 1, 0},
+    {"kt", "velocity", 1852.0 / 3600, 0},
+    {"km/h", "velocity", 1 / 3.6, 0},
+    {"mph", "velocity", 0.44704, 0},
+    {"deg", "angle", kPi / 180, 0},
+    {"N·m", "torque", 1, 0},
+    {"gf/W", "efficiency", kGravity * 1e-3, 0},
+}};
+
+}  // namespace
+
+const Unit& unit_from_name(std::string_view name) {
+  const auto* found =
+      std::find_if(kUnits.begin(), kUnits.end(), [&](const Unit& unit) { return unit.name == name; });
+  if (found != kUnits.end()) return *found;
+  std::vector<std::string_view> names;
+  for (const Unit& unit : kUnits) names.push_back(unit.name);
+  throw InputError(fmt::format("'{}' is not a known unit; known are {}", name, fmt::join(names, " ")));
+}
+
+std::string_view unit_in_header(std::string_view header) {
+  const auto open = header.rfind('(');
+  if (open == std::string_view::npos || !header.ends_with(')')) return {};
+  return header.substr(open + 1, header.size() - open - 2);
+}
+
+}  // namespace tunnelrig

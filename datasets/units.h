@@ -1,0 +1,27 @@
+// Units that tables of other people arrive in, and their factors to SI.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tunnelrig {
+
+/// value_SI = value · factor + offset. Rotation speed is kept in rev/min, temperature in °C, as the campaign
+/// folder has them; everything else is SI.
+struct Unit {
+  std::string_view name;
+  std::string_view quantity;  // "force", "speed", "temperature", …
+  double factor = 1;
+  double offset = 0;
+
+  double convert(double value) const { return value * factor + offset; }
+};
+
+/// The unit of that name ("gf", "rpm", "in", "degC", "%", …); throws InputError listing what is known.
+const Unit& unit_from_name(std::string_view name);
+
+/// "Thrust (gf)" → "gf"; empty where the header carries no unit in parentheses.
+std::string_view unit_in_header(std::string_view header);
+
+}  // namespace tunnelrig

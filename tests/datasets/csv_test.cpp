@@ -1,0 +1,72 @@
+#include "datasets/csv.h"
+
+#include "datasets/error.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no InputError";
+}
+
+TEST(Csv, KeepsCellTextAsWritten) {
+  const Sheet sheet = parse_csv("a,b\n 1.50 ,\"x, \"\"y\"\"\"\n,\n", "t.csv");
+  EXPECT_THAT(sheet.columns, ElementsAre("a", "b"));
+  ASSERT_EQ(sheet.rows.size(), 2u);
+  EXPECT_THAT(sheet.rows[0].cells, ElementsAre(" 1.50 ", "x, \"y\""));
+  EXPECT_EQ(format_csv(sheet), "a,b\n 1.50 ,\"x, \"\"y\"\"\"\n,\n");
+}
+
+TEST(Csv, TakesWindowsLineEndsAndByteOrderMark) {
+  const Sheet sheet = parse_csv(
+      "\xEF\xBB\xBF"
+      "a,b\r\n1,2\r\n\r\n3,\"4\r\n5\"\r\n",
+      "t.csv");
+  ASSERT_EQ(sheet.rows.size(), 2u);
+  EXPECT_THAT(sheet.rows[0].cells, ElementsAre("1", "2"));
+  EXPECT_THAT(sheet.rows[1].cells, ElementsAre("3", "4\r\n5"));
+  EXPECT_EQ(sheet.rows[1].line, 4);
+}
+
+TEST(Csv, NamesFileLineAndColumnOfWhatIsWrong) {
+  EXPECT_THAT(message_of([] { parse_csv("", "t.csv"); }), HasSubstr("t.csv:1: the file is empty"));
+  EXPECT_THAT(message_of([] { parse_csv("a,a\n", "t.csv"); }), HasSubstr("column a stands twice"));
+  EXPECT_THAT(message_of([] { parse_csv("a,b\n1,2\n1\n", "t.csv"); }),
+              HasSubstr("t.csv:3: 1 cells where the header has 2"));
+  EXPECT_THAT(message_of([] { parse_csv("a\n\"1\n2\n", "t.csv"); }), HasSubstr("t.csv:2: a quote is opened"));
+  EXPECT_THAT(message_of([] {
+                parse_csv(
+                    "a\n\xB0"
+                    "C\n",
+                    "t.csv");
+              }),
+              HasSubstr("t.csv:2: this is not UTF-8"));
+  const Sheet sheet = parse_csv("a\nx\n", "t.csv");
+  EXPECT_THAT(message_of([&] { (void)sheet.number(0, "a"); }),
+              HasSubstr("t.csv:2: column a: 'x' is not a finite"));
+  EXPECT_THAT(message_of([&] { (void)sheet.require("b"); }),
+              HasSubstr("t.csv:1: the required column b is missing"));
+}
+
+TEST(Csv, NumbersAreStrict) {
+  EXPECT_EQ(parse_number("1.5"), 1.5);
+  EXPECT_EQ(parse_number(" -2e3\t"), -2000);
+  EXPECT_EQ(parse_number("+4"), 4);
+  for (const char* text : {"", "nan", "inf", "1,5", "1 2", "0x10", "1.5V", "--1"}) {
+    EXPECT_FALSE(parse_number(text)) << text;
+  }
+}
+
+}  // namespace
+}  // namespace tunnelrig
