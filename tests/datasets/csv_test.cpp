@@ -1,6 +1,6 @@
 #include "datasets/csv.h"
 
-#include "datasets/error.h"
+#include "support/message_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,17 +8,9 @@
 namespace tunnelrig {
 namespace {
 
+using test::message_of;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no InputError";
-}
 
 TEST(Csv, KeepsCellTextAsWritten) {
   const Sheet sheet = parse_csv("a,b\n 1.50 ,\"x, \"\"y\"\"\"\n,\n", "t.csv");

@@ -1,0 +1,65 @@
+#include "analysis/autocorrelation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+namespace tunnelrig {
+namespace {
+
+double mean_of(std::span<const double> series) {
+  return std::accumulate(series.begin(), series.end(), 0.0) / static_cast<double>(series.size());
+}
+
+double autocovariance(const std::vector<double>& centred, std::size_t lag) {
+  double sum = 0;
+  for (std::size_t i = lag; i < centred.size(); ++i) sum += centred[i] * centred[i - lag];
+  return sum / static_cast<double>(centred.size());
+}
+
+}  // namespace
+
+double variance_of_mean(std::span<const double> series) {
+  if (series.size() < 4) return 0;
+  const auto count = static_cast<double>(series.size());
+  const double mean = mean_of(series);
+  std::vector<double> centred(series.begin(), series.end());
+  for (double& value : centred) value -= mean;
+
+  const double own = autocovariance(centred, 0);
+  double sum = -own;
+  double last_pair = INFINITY;
+  for (std::size_t lag = 0; lag + 1 < series.size() / 2; lag += 2) {
+    const double pair = autocovariance(centred, lag) + autocovariance(centred, lag + 1);
+    if (pair <= 0) break;
+    last_pair = std::min(last_pair, pair);
+    sum += 2 * last_pair;
+  }
+  // Blocks that alternate make the mean better known than independent ones; a series of them never makes it
+  // certain.
+  return std::max(sum, 0.05 * own) / (count - 1);
+}
+
+Trend trend_of(std::span<const double> series) {
+  if (series.size() < 4) return {};
+  const auto count = static_cast<double>(series.size());
+  const double centre = (count - 1) / 2;
+  const double mean = mean_of(series);
+  double cross = 0, spread = 0;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const double x = static_cast<double>(i) - centre;
+    cross += x * (series[i] - mean);
+    spread += x * x;
+  }
+  const double slope = cross / spread;
+  std::vector<double> residual(series.begin(), series.end());
+  for (std::size_t i = 0; i < residual.size(); ++i) residual[i] -= slope * (static_cast<double>(i) - centre);
+  // var(slope) = s²/Σx² for independent residuals; the autocorrelation inflates it as it does the mean's
+  // variance.
+  const double error = std::sqrt(variance_of_mean(residual) * count / spread) * (count - 1);
+  const double change = slope * (count - 1);
+  return {change, error > 0 ? change / error : 0};
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,218 @@
+#include "analysis/spectrum.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include <fftw3.h>
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+constexpr std::size_t kWindow = 4096;
+constexpr std::size_t kShortestWindow = 128;
+constexpr std::size_t kMostLines = 12;
+constexpr double kShaftBand = 0.04;
+
+/// Plans are made once per length; FFTW's planner is the one part of it that threads must not share.
+struct Plan {
+  explicit Plan(std::size_t window)
+      : in(fftwf_alloc_real(window)),
+        out(fftwf_alloc_complex(window / 2 + 1)),
+        plan(fftwf_plan_dft_r2c_1d(static_cast<int>(window), in, out, FFTW_ESTIMATE)) {}
+  ~Plan() {
+    fftwf_destroy_plan(plan);
+    fftwf_free(in);
+    fftwf_free(out);
+  }
+  Plan(const Plan&) = delete;
+  Plan& operator=(const Plan&) = delete;
+
+  float* in;
+  fftwf_complex* out;
+  fftwf_plan plan;
+};
+
+Plan& plan_for(std::size_t window) {
+  static std::mutex planner;
+  thread_local std::map<std::size_t, std::unique_ptr<Plan>> plans;
+  std::unique_ptr<Plan>& plan = plans[window];
+  if (!plan) {
+    const std::lock_guard lock(planner);
+    plan = std::make_unique<Plan>(window);
+  }
+  return *plan;
+}
+
+}  // namespace
+
+WelchSpectrum::WelchSpectrum(std::size_t channels) : channels_(channels) {}
+
+void WelchSpectrum::choose_window(std::size_t window) {
+  window_ = window;
+  taper_.resize(window);
+  for (std::size_t i = 0; i < window; ++i) {
+    const double phase = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(window);
+    taper_[i] = static_cast<float>(0.5 - 0.5 * std::cos(phase));
+  }
+  power_.assign(channels_ * (window / 2 + 1), 0);
+}
+
+void WelchSpectrum::transform(std::size_t first_frame) {
+  Plan& plan = plan_for(window_);
+  const std::size_t bins = window_ / 2 + 1;
+  for (std::size_t c = 0; c < channels_; ++c) {
+    const float* from = waiting_.data() + first_frame * channels_ + c;
+    for (std::size_t i = 0; i < window_; ++i) plan.in[i] = from[i * channels_] * taper_[i];
+    fftwf_execute(plan.plan);
+    double* sum = power_.data() + c * bins;
+    for (std::size_t k = 0; k < bins; ++k) {
+      sum[k] += static_cast<double>(plan.out[k][0] * plan.out[k][0] + plan.out[k][1] * plan.out[k][1]);
+    }
+  }
+  ++segments_;
+}
+
+void WelchSpectrum::transform_waiting(bool all) {
+  const std::size_t frames = waiting_.size() / channels_;
+  if (window_ == 0) {
+    if (!all && frames < 2 * kWindow) return;  // how long the run is will decide
+    std::size_t window = kWindow;
+    while (window > kShortestWindow && window * 2 > frames) window /= 2;
+    if (window * 2 > frames) return;
+    choose_window(window);
+  }
+  std::size_t first = 0;
+  for (; first + window_ <= frames; first += window_ / 2) transform(first);
+  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(first * channels_));
+}
+
+void WelchSpectrum::add(std::span<const float> frames) {
+  waiting_.insert(waiting_.end(), frames.begin(), frames.end());
+  if (waiting_.size() >= 2 * kWindow * channels_) transform_waiting(false);
+}
+
+void WelchSpectrum::interrupt() {
+  transform_waiting(false);
+  if (window_ != 0)
+    waiting_.clear();  // a run that begins with gaps keeps what it has until a window is chosen
+}
+
+void WelchSpectrum::finish() {
+  transform_waiting(true);
+  waiting_.clear();
+  // |X| of a sinusoid at a bin's middle is A · N/2 · 0.5 behind a Hann window
+  const double scale =
+      segments_ == 0 ? 0 : 16.0 / (static_cast<double>(window_ * window_) * static_cast<double>(segments_));
+  for (double& value : power_) value *= scale;
+}
+
+std::span<const double> WelchSpectrum::power(std::size_t channel) const {
+  const std::size_t bins = window_ == 0 ? 0 : window_ / 2 + 1;
+  return std::span(power_).subspan(channel * bins, bins);
+}
+
+// --- lines
+// -----------------------------------------------------------------------------------------------------
+
+namespace {
+
+/// The noise around a bin: the median of up to 48 bins on each side, the line's own three left out.
+double noise_around(std::span<const double> power, std::size_t bin) {
+  constexpr std::size_t kReach = 48;
+  std::vector<double> around;
+  const std::size_t from = bin > kReach ? bin - kReach : 1;
+  const std::size_t to = std::min(bin + kReach, power.size() - 1);
+  for (std::size_t k = from; k <= to; ++k) {
+    if (k + 2 < bin || k > bin + 2) around.push_back(power[k]);
+  }
+  const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
+  std::nth_element(around.begin(), middle, around.end());
+  return *middle;
+}
+
+/// A mean of M periodograms exceeds this multiple of its median about once in a million bins.
+double threshold(std::size_t segments) {
+  const auto m = static_cast<double>(segments);
+  return 1 + 5 / std::sqrt(m) + 14 / m;
+}
+
+/// Frequency and amplitude of the line at a local maximum: for a Hann window the ratio of the two highest
+/// bins gives the offset δ = (2r − 1)/(r + 1), and the window's shape there the amplitude.
+SpectralLine refine(std::span<const double> power, std::size_t bin, double bin_hz) {
+  const bool right = power[bin + 1] > power[bin - 1];
+  const double r = std::sqrt((right ? power[bin + 1] : power[bin - 1]) / power[bin]);
+  const double offset = std::clamp((2 * r - 1) / (r + 1), 0.0, 0.5);
+  const double x = std::numbers::pi * offset;
+  const double shape = offset < 1e-6 ? 1.0 : std::sin(x) / x / (1 - offset * offset);
+  return {.frequency_hz = (static_cast<double>(bin) + (right ? offset : -offset)) * bin_hz,
+          .amplitude_V = std::sqrt(power[bin]) / shape,
+          .prominence = 0,
+          .name = ""};
+}
+
+std::vector<SpectralLine> peaks(const WelchSpectrum& spectrum, std::size_t channel, double bin_hz) {
+  const auto power = spectrum.power(channel);
+  std::vector<SpectralLine> found;
+  for (std::size_t k = 4; k + 1 < power.size(); ++k) {  // below bin 4 is turbulence and the mean
+    if (power[k] < power[k - 1] || power[k] <= power[k + 1]) continue;
+    const double noise = noise_around(power, k);
+    if (power[k] <= threshold(spectrum.segments()) * noise || noise <= 0) continue;
+    SpectralLine line = refine(power, k, bin_hz);
+    line.prominence = power[k] / noise;
+    found.push_back(line);
+  }
+  std::sort(found.begin(), found.end(),
+            [](const auto& a, const auto& b) { return a.amplitude_V > b.amplitude_V; });
+  return found;
+}
+
+/// Where a frequency appears after sampling.
+double folded(double frequency_hz, double rate_hz) {
+  const double rest = std::fmod(frequency_hz, rate_hz);
+  return std::min(rest, rate_hz - rest);
+}
+
+std::string name_of_line(double frequency_hz, double shaft_hz, double rate_hz, double tolerance_hz) {
+  const auto near = [&](double other_hz) { return std::abs(frequency_hz - other_hz) <= tolerance_hz; };
+  for (int k = 1; shaft_hz > 0 && k <= 16; ++k) {
+    if (!near(folded(k * shaft_hz, rate_hz))) continue;
+    const std::string base = k == 1 ? "shaft" : k == 2 ? "blade_pass" : fmt::format("shaft_x{}", k);
+    return k * shaft_hz > rate_hz / 2 ? base + "_alias" : base;
+  }
+  for (const int mains : {50, 60}) {
+    for (int k = 1; k <= 5; ++k) {
+      if (near(folded(k * mains, rate_hz))) return fmt::format("mains_{}", k * mains);
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double rate_hz,
+                    double expected_shaft_hz) {
+  LineList list;
+  if (spectrum.segments() == 0) return list;
+  const double bin_hz = rate_hz / static_cast<double>(spectrum.window());
+  list.lines = peaks(spectrum, channel, bin_hz);
+  for (const SpectralLine& line : list.lines) {  // strongest first
+    if (std::abs(line.frequency_hz / expected_shaft_hz - 1) > kShaftBand) continue;
+    list.shaft_hz = line.frequency_hz;
+    break;
+  }
+  if (list.lines.size() > kMostLines) list.lines.resize(kMostLines);
+  for (SpectralLine& line : list.lines) {
+    line.name = name_of_line(line.frequency_hz, list.shaft_hz, rate_hz, 1.5 * bin_hz);
+  }
+  return list;
+}
+
+}  // namespace tunnelrig

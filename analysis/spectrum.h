@@ -1,0 +1,58 @@
+// Spectra of the channels of a run, and the lines in them.
+#pragma once
+
+#include "datasets/run_statistics.h"
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace tunnelrig {
+
+/// Welch's averaged periodogram of several channels: Hann windows of 4096 frames, half overlapped; shorter
+/// for runs of fewer than 8192 frames (docs/run-statistics.md).
+class WelchSpectrum {
+ public:
+  explicit WelchSpectrum(std::size_t channels);
+
+  /// Consecutive frames, channel by channel within a frame, in volts less anything constant.
+  void add(std::span<const float> frames);
+
+  /// Frames are missing here: no window reaches across.
+  void interrupt();
+
+  /// The run is over: averages of the power of bins 0 … window/2, channel after channel; empty for fewer than
+  /// 256 frames.
+  void finish();
+
+  std::size_t window() const { return window_; }
+  std::size_t segments() const { return segments_; }
+
+  /// Power of one channel, scaled so that a sinusoid of amplitude A at the middle of a bin gives A².
+  std::span<const double> power(std::size_t channel) const;
+
+ private:
+  void transform(std::size_t first_frame);
+  void transform_waiting(bool all);
+  void choose_window(std::size_t window);
+
+  std::size_t channels_;
+  std::size_t window_ = 0;  // frames; 0 until chosen
+  std::size_t segments_ = 0;
+  std::vector<float> waiting_;  // frames not yet done with
+  std::vector<float> taper_;
+  std::vector<double> power_;
+};
+
+/// The shaft's line: the strongest within 4 % of where it is expected, if it stands out.
+/// The lines of a spectrum, strongest first, at most twelve; named after the shaft (shaft, blade_pass = twice
+/// the shaft of a two-bladed propeller, shaft_x3 …, with _alias beyond the Nyquist frequency) or the mains
+/// (mains_50 …).
+struct LineList {
+  std::vector<SpectralLine> lines;
+  double shaft_hz = 0;  // 0: none found
+};
+LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double rate_hz,
+                    double expected_shaft_hz);
+
+}  // namespace tunnelrig

@@ -1,0 +1,301 @@
+#include "analysis/variance_components.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <unsupported/Eigen/SpecialFunctions>
+
+namespace tunnelrig {
+namespace {
+
+struct Visit {
+  std::size_t location = 0, session = 0;
+  double runs = 0, mean = 0, squares = 0;  // squares: around the visit's mean
+};
+
+struct Design {
+  std::vector<Visit> visits;
+  std::size_t locations = 0, sessions = 0;
+};
+
+Design design_of(const GroupedRuns& runs) {
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> index;
+  Design design;
+  for (std::size_t i = 0; i < runs.value.size(); ++i) {
+    const auto key = std::make_pair(runs.location[i], runs.session[i]);
+    const auto [found, fresh] = index.emplace(key, design.visits.size());
+    if (fresh) design.visits.push_back({key.first, key.second});
+    Visit& visit = design.visits[found->second];
+    const double old_mean = visit.mean;  // Welford
+    visit.runs += 1;
+    visit.mean += (runs.value[i] - old_mean) / visit.runs;
+    visit.squares += (runs.value[i] - old_mean) * (runs.value[i] - visit.mean);
+    design.locations = std::max(design.locations, key.first + 1);
+    design.sessions = std::max(design.sessions, key.second + 1);
+  }
+  return design;
+}
+
+double digamma(double x) { return Eigen::numext::digamma(x); }
+double trigamma(double x) { return Eigen::numext::polygamma(1.0, x); }
+
+/// The x with ψ'(x) = y, by Newton's method on 1/ψ' (Smyth 2004, appendix).
+double inverse_trigamma(double y) {
+  double x = 0.5 + 1 / y;
+  for (int i = 0; i < 50; ++i) {
+    const double value = trigamma(x);
+    const double step = value * (1 - value / y) / Eigen::numext::polygamma(2.0, x);
+    x += step;
+    if (std::abs(step) < 1e-9 * x) break;
+  }
+  return x;
+}
+
+/// The prior that the locations' sample variances suggest for each other: its variance and its weight in
+/// degrees of freedom.
+struct Prior {
+  double variance = 0;
+  double dof = std::numeric_limits<double>::infinity();
+};
+
+Prior prior_of(const std::vector<double>& squares, const std::vector<double>& dof, double pooled) {
+  Prior prior{.variance = pooled};
+  std::vector<double> scores;
+  double trigammas = 0;
+  for (std::size_t l = 0; l < dof.size(); ++l) {
+    if (dof[l] < 1 || squares[l] <= 0) continue;
+    scores.push_back(std::log(squares[l] / dof[l]) - digamma(dof[l] / 2) + std::log(dof[l] / 2));
+    trigammas += trigamma(dof[l] / 2);
+  }
+  constexpr std::size_t kFewLocations = 5;
+  if (scores.size() < kFewLocations) return prior;
+  const auto count = static_cast<double>(scores.size());
+  double mean = 0, spread = 0;
+  for (const double score : scores) mean += score / count;
+  for (const double score : scores) spread += (score - mean) * (score - mean) / (count - 1);
+  const double excess = spread - trigammas / count;
+  // The spread has itself an error; within two of it, the locations are taken to scatter alike.
+  if (excess <= 2 * spread * std::sqrt(2 / (count - 1))) return prior;
+  prior.dof = 2 * inverse_trigamma(excess);
+  prior.variance = std::exp(mean + digamma(prior.dof / 2) - std::log(prior.dof / 2));
+  return prior;
+}
+
+void fit_run_variances(const Design& design, VarianceComponents& components) {
+  std::vector<double> squares(design.locations), dof(design.locations);
+  double all_squares = 0, all_dof = 0;
+  for (const Visit& visit : design.visits) {
+    squares[visit.location] += visit.squares;
+    dof[visit.location] += visit.runs - 1;
+    all_squares += visit.squares;
+    all_dof += visit.runs - 1;
+  }
+  components.run_by_location.assign(design.locations, 0);
+  components.run_dof.assign(design.locations, 0);
+  components.run_known = all_dof >= 1;
+  if (!components.run_known) return;
+  components.run = all_squares / all_dof;
+  const Prior prior = prior_of(squares, dof, components.run);
+  for (std::size_t l = 0; l < design.locations; ++l) {
+    const bool alike = std::isinf(prior.dof);
+    components.run_by_location[l] =
+        alike ? components.run : (prior.dof * prior.variance + squares[l]) / (prior.dof + dof[l]);
+    components.run_dof[l] = alike ? all_dof : prior.dof + dof[l];
+  }
+}
+
+/// What a visit's mean varies by without the visit and session components.
+double own_variance(const Visit& visit, const VarianceComponents& components) {
+  return components.run_known ? components.run_by_location[visit.location] / visit.runs : 0;
+}
+
+/// Restricted log-likelihood of the visits' means, locations fixed, by Henderson's mixed-model equations:
+/// locations and visits are eliminated by hand, which leaves a matrix of sessions.
+double restricted_likelihood(const Design& design, const VarianceComponents& components, double visit,
+                             double session) {
+  const auto sessions = static_cast<Eigen::Index>(design.sessions);
+  std::vector<double> weight(design.locations), weighted(design.locations);
+  Eigen::MatrixXd by_location = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(design.locations), sessions);
+  Eigen::MatrixXd schur = Eigen::MatrixXd::Zero(sessions, sessions);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(sessions);
+  double log_determinants = 0, squares = 0;
+  for (const Visit& v : design.visits) {
+    const double w = 1 / (visit + own_variance(v, components));
+    const auto s = static_cast<Eigen::Index>(v.session);
+    log_determinants -= std::log(w);
+    weight[v.location] += w;
+    weighted[v.location] += w * v.mean;
+    by_location(static_cast<Eigen::Index>(v.location), s) += w;
+    schur(s, s) += w;
+    right(s) += w * v.mean;
+    squares += w * v.mean * v.mean;
+  }
+  for (std::size_t l = 0; l < design.locations; ++l) {
+    if (weight[l] <= 0) continue;
+    const auto row = by_location.row(static_cast<Eigen::Index>(l));
+    log_determinants += std::log(weight[l]);
+    squares -= weighted[l] * weighted[l] / weight[l];
+    schur.noalias() -= row.transpose() * row / weight[l];
+    right -= row.transpose() * (weighted[l] / weight[l]);
+  }
+  if (session > 0) {
+    // log|G| + log|S + G⁻¹| = log|I + σ² S|, which stays finite as σ² goes to 0
+    const Eigen::MatrixXd scaled = Eigen::MatrixXd::Identity(sessions, sessions) + session * schur;
+    const Eigen::LLT<Eigen::MatrixXd> factor(scaled);
+    for (Eigen::Index s = 0; s < sessions; ++s) log_determinants += 2 * std::log(factor.matrixL()(s, s));
+    squares -= session * right.dot(factor.solve(right));
+  }
+  return -0.5 * (log_determinants + squares);
+}
+
+/// Maximises over both variances at once: a grid over decades, refined around its best point. The surface is
+/// smooth with at most a ridge, and a grid cannot fail to converge.
+void maximise(const Design& design, bool free_visit, bool free_session, double scale,
+              VarianceComponents& components) {
+  constexpr int kSteps = 4, kRounds = 9;
+  double span = 3.0;  // decades on either side
+  std::array<double, 2> centre = {std::log10(scale), std::log10(scale)};
+  double best = -std::numeric_limits<double>::infinity();
+  for (int round = 0; round < kRounds; ++round, span *= 0.5) {
+    const auto around = centre;
+    for (int i = -kSteps - 1; i <= kSteps; ++i) {
+      for (int j = -kSteps - 1; j <= kSteps; ++j) {
+        if ((!free_visit && i >= -kSteps) || (!free_session && j >= -kSteps)) continue;
+        const double at_visit = around[0] + span * i / kSteps, at_session = around[1] + span * j / kSteps;
+        const double visit = i < -kSteps ? 0 : std::pow(10, at_visit);  // the extra step is the boundary
+        const double session = j < -kSteps ? 0 : std::pow(10, at_session);
+        const double value = restricted_likelihood(design, components, visit, session);
+        if (!(value > best)) continue;
+        best = value;
+        components.visit = visit;
+        components.session = session;
+        if (visit > 0) centre[0] = at_visit;
+        if (session > 0) centre[1] = at_session;
+      }
+    }
+  }
+}
+
+/// Covariance of the two estimates: the inverse of the expected information, ½ tr(P V_k P V_l).
+Eigen::Matrix2d covariance_of_estimates(const Design& design, const VarianceComponents& components) {
+  const auto n = static_cast<Eigen::Index>(design.visits.size());
+  Eigen::MatrixXd session_part = Eigen::MatrixXd::Zero(n, n), total(n, n);
+  Eigen::MatrixXd locations = Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(design.locations));
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Visit& a = design.visits[static_cast<std::size_t>(i)];
+    locations(i, static_cast<Eigen::Index>(a.location)) = 1;
+    for (Eigen::Index j = 0; j < n; ++j) {
+      session_part(i, j) = a.session == design.visits[static_cast<std::size_t>(j)].session ? 1 : 0;
+    }
+  }
+  total = components.session * session_part;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    total(i, i) += components.visit + own_variance(design.visits[static_cast<std::size_t>(i)], components);
+  }
+  const Eigen::MatrixXd inverse = total.llt().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd inverse_x = inverse * locations;
+  const Eigen::MatrixXd p =
+      inverse - inverse_x * (locations.transpose() * inverse_x).ldlt().solve(inverse_x.transpose());
+  const Eigen::MatrixXd p_session = p * session_part;
+  const double visit_visit = 0.5 * p.squaredNorm();
+  const double visit_session = 0.5 * p.cwiseProduct(p_session.transpose()).sum();
+  const double session_session = 0.5 * p_session.cwiseProduct(p_session.transpose()).sum();
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  if (components.visit_known && components.session_known) {
+    Eigen::Matrix2d information;
+    information << visit_visit, visit_session, visit_session, session_session;
+    covariance = information.inverse();
+  } else if (components.visit_known) {
+    covariance(0, 0) = 1 / visit_visit;
+  } else if (components.session_known) {
+    covariance(1, 1) = 1 / session_session;
+  }
+  return covariance;
+}
+
+}  // namespace
+
+VarianceComponents fit_variance_components(const GroupedRuns& runs) {
+  VarianceComponents components;
+  const Design design = design_of(runs);
+  fit_run_variances(design, components);
+  const std::size_t visits = design.visits.size();
+  const std::size_t freedom =
+      visits - std::min(visits, design.locations);  // visits beyond the first of each location
+  const std::size_t for_sessions = design.sessions - 1;
+  components.session_known = freedom >= 1 && for_sessions >= 1;
+  components.visit_known = freedom > for_sessions;
+  if (!components.run_known && !components.visit_known) components.session_known = false;
+  if (!components.session_known && !components.visit_known) return components;
+
+  double squares = 0;
+  std::vector<double> count(design.locations), mean(design.locations);
+  for (const Visit& visit : design.visits) {
+    count[visit.location] += 1;
+    mean[visit.location] += (visit.mean - mean[visit.location]) / count[visit.location];
+  }
+  for (const Visit& visit : design.visits)
+    squares += (visit.mean - mean[visit.location]) * (visit.mean - mean[visit.location]);
+  const double scale = std::max(squares / static_cast<double>(std::max<std::size_t>(freedom, 1)), 1e-300);
+  maximise(design, components.visit_known, components.session_known, scale, components);
+  components.covariance = covariance_of_estimates(design, components);
+  return components;
+}
+
+LocationMeans location_means(const GroupedRuns& runs, const VarianceComponents& components) {
+  const Design design = design_of(runs);
+  const std::size_t n = design.locations;
+  LocationMeans means{.mean = std::vector<double>(n),
+                      .std = std::vector<double>(n),
+                      .runs = std::vector<int>(n),
+                      .sessions = std::vector<int>(n),
+                      .covariance = {},
+                      .dof = std::vector<double>(n),
+                      .run_part = std::vector<double>(n),
+                      .visit_part = std::vector<double>(n),
+                      .session_part = std::vector<double>(n)};
+  std::vector<double> total(n), squares(n);
+  for (const Visit& visit : design.visits) {
+    total[visit.location] += visit.runs;
+    means.mean[visit.location] += visit.runs * visit.mean;
+    means.sessions[visit.location] += 1;
+  }
+  for (std::size_t l = 0; l < n; ++l) means.mean[l] /= total[l];
+  for (std::size_t i = 0; i < runs.value.size(); ++i) {
+    const double difference = runs.value[i] - means.mean[runs.location[i]];
+    squares[runs.location[i]] += difference * difference;
+  }
+  // Shares of a location's runs in each session: w(l, s)
+  Eigen::MatrixXd share =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(design.sessions));
+  for (const Visit& visit : design.visits) {
+    share(static_cast<Eigen::Index>(visit.location), static_cast<Eigen::Index>(visit.session)) =
+        visit.runs / total[visit.location];
+  }
+  means.covariance = components.session * share * share.transpose();
+  for (std::size_t l = 0; l < n; ++l) {
+    const auto row = static_cast<Eigen::Index>(l);
+    means.runs[l] = static_cast<int>(total[l]);
+    means.std[l] =
+        total[l] > 1 ? std::sqrt(squares[l] / (total[l] - 1)) : std::numeric_limits<double>::quiet_NaN();
+    const double concentration = share.row(row).squaredNorm();
+    means.run_part[l] = components.run_known ? components.run_by_location[l] / total[l] : 0;
+    means.visit_part[l] = components.visit * concentration;
+    means.session_part[l] = components.session * concentration;
+    means.covariance(row, row) += means.run_part[l] + means.visit_part[l];
+    const double variance = means.covariance(row, row);
+    const double run_variance =
+        components.run_known ? 2 * means.run_part[l] * means.run_part[l] / components.run_dof[l] : 0;
+    const double of_estimates = concentration * concentration * components.covariance.sum() + run_variance;
+    means.dof[l] = of_estimates > 0 ? std::max(1.0, 2 * variance * variance / of_estimates)
+                                    : std::numeric_limits<double>::infinity();
+  }
+  return means;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,301 @@
+#include "daq/logger.h"
+
+#include "daq/block_queue.h"
+#include "daq/loss_ledger.h"
+#include "daq/packet_decoder.h"
+#include "datasets/error.h"
+#include "datasets/statistics_store.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <thread>
+#include <utility>
+
+namespace tunnelrig {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kReadSize = 65536;
+constexpr std::size_t kQueueLimit = std::size_t{64} << 20;
+constexpr std::chrono::milliseconds kReadTimeout{50};
+constexpr std::chrono::milliseconds kReopenPause{250};
+constexpr std::chrono::milliseconds kTick{20};
+constexpr std::chrono::milliseconds kProgressInterval{200};
+constexpr double kChunk_s = 0.1;
+
+/// Reads on its own thread until the source ends or the queue closes, so that neither a slow disk nor a slow
+/// sum makes a device's small buffer overflow.
+class Reader {
+ public:
+  Reader(PacketSource& source, BlockQueue& queue)
+      : source_(source), queue_(queue), thread_([this] { run(); }) {}
+  ~Reader() {
+    queue_.close();
+    thread_.join();
+  }
+  Reader(const Reader&) = delete;
+  Reader& operator=(const Reader&) = delete;
+
+  /// The recorder saw no new frame for a while: the reader tries to get the source back.
+  void ask_to_reopen() { reopen_ = true; }
+
+ private:
+  void run() {
+    std::vector<std::byte> buffer(kReadSize);
+    ReadResult result;
+    do {
+      if (reopen_.exchange(false)) source_.reopen();
+      result = source_.read(buffer, kReadTimeout);
+      if (result.status == ReadResult::Status::kBroken && !source_.reopen())
+        std::this_thread::sleep_for(kReopenPause);
+    } while (queue_.push({result.status,
+                          result.time_s,
+                          {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(result.size)}}) &&
+             result.status != ReadResult::Status::kEnd);
+  }
+
+  PacketSource& source_;
+  BlockQueue& queue_;
+  std::atomic<bool> reopen_{false};
+  std::thread thread_;
+};
+
+/// Hands frames to the store and to the summary, and keeps the running means.
+class RunSink : public FrameSink {
+ public:
+  RunSink(RawWriter& writer, RunSummarizer& summarizer) : writer_(writer), summarizer_(summarizer) {}
+
+  void frames(std::span<const std::byte> data) override {
+    writer_.frames(data);
+    summarizer_.frames(data);
+    std::array<std::int16_t, 4> frame{};
+    for (std::size_t at = 0; at < data.size(); at += sizeof frame) {
+      std::memcpy(frame.data(), data.data() + at, sizeof frame);
+      for (std::size_t c = 0; c < frame.size(); ++c) sums_[c] += frame[c];
+    }
+    count_ += data.size() / sizeof frame;
+  }
+
+  void gap(const Gap& gap) override {
+    writer_.gap(gap);
+    summarizer_.gap(gap);
+  }
+
+  std::array<double, 4> means() const {
+    std::array<double, 4> means{};
+    for (std::size_t c = 0; c < means.size() && count_ > 0; ++c) {
+      means[c] = static_cast<double>(sums_[c]) / static_cast<double>(count_);
+    }
+    return means;
+  }
+
+ private:
+  RawWriter& writer_;
+  RunSummarizer& summarizer_;
+  std::array<std::int64_t, 4> sums_{};
+  std::uint64_t count_ = 0;
+};
+
+/// Packets into the tracker, stamped with the time of the block they came in.
+class TrackerSink : public PacketSink {
+ public:
+  TrackerSink(LossTracker& tracker, FrameSink& sink) : tracker_(tracker), sink_(sink) {}
+  void packet(const Packet& packet) override { tracker_.take(packet, time_s_, sink_); }
+  void set_time(double time_s) { time_s_ = time_s; }
+
+ private:
+  LossTracker& tracker_;
+  FrameSink& sink_;
+  double time_s_ = 0;
+};
+
+/// Notices that no new frame comes, by the source's own clock (the virtual rig's runs faster than ours).
+class Watchdog {
+ public:
+  enum class Verdict { kFine, kBecameSilent, kStillSilent, kGiveUp };
+
+  Watchdog(double silence_s, double give_up_s) : silence_s_(silence_s), give_up_s_(give_up_s) {}
+
+  Verdict look(std::uint64_t frames, double time_s) {
+    if (!started_ || frames != frames_) {
+      started_ = true;
+      silent_ = false;
+      frames_ = frames;
+      since_s_ = time_s;
+      next_alarm_s_ = time_s + silence_s_;
+      return Verdict::kFine;
+    }
+    if (time_s - since_s_ >= give_up_s_) return Verdict::kGiveUp;
+    if (time_s < next_alarm_s_) return Verdict::kFine;
+    next_alarm_s_ = time_s + silence_s_;
+    return std::exchange(silent_, true) ? Verdict::kStillSilent : Verdict::kBecameSilent;
+  }
+
+  bool silent() const { return silent_; }
+
+ private:
+  double silence_s_, give_up_s_;
+  bool started_ = false, silent_ = false;
+  std::uint64_t frames_ = 0;
+  double since_s_ = 0, next_alarm_s_ = 0;
+};
+
+/// The recording thread's side of one run.
+class Recording {
+ public:
+  Recording(CampaignFile& file, const std::string& run, const CampaignInfo& info, const LogSettings& settings,
+            RunSummarizer& summarizer, const std::string& source_name)
+      : settings_(settings),
+        rate_hz_(info.daq.sample_rate_hz),
+        tracker_(static_cast<std::uint64_t>(std::llround(settings.duration_s * rate_hz_))),
+        writer_(file, run, RawFormat{}, static_cast<std::size_t>(kChunk_s * rate_hz_)),
+        sink_(writer_, summarizer),
+        packets_(tracker_, sink_),
+        watchdog_(settings.silence_s, settings.give_up_s),
+        source_name_(source_name) {}
+
+  /// Works until the run is complete or ends otherwise; returns the reason, empty where it is complete.
+  std::string record(BlockQueue& queue, Reader& reader,
+                     const std::function<void(const LogProgress&)>& progress, const std::atomic<bool>& stop) {
+    std::ofstream capture;
+    if (!settings_.capture.empty()) capture.open(settings_.capture, std::ios::binary);
+    auto next_progress = Clock::now();
+    while (!tracker_.complete()) {
+      if (stop) return "stopped by the user";
+      const bool was_silent = watchdog_.silent();
+      if (const auto block = queue.pop(kTick)) {
+        if (capture.is_open())
+          capture.write(reinterpret_cast<const char*>(block->bytes.data()),
+                        static_cast<std::streamsize>(block->bytes.size()));
+        const std::string end = take(*block, reader);
+        if (!end.empty()) return end;
+      }
+      commit_when_due();
+      if (Clock::now() >= next_progress || watchdog_.silent() != was_silent) {
+        next_progress = Clock::now() + kProgressInterval;
+        report(progress);
+      }
+    }
+    return "";
+  }
+
+  LogOutcome finish(RunSummarizer& summarizer, const std::string& end_reason) {
+    LogOutcome outcome;
+    outcome.state = end_reason.empty() ? RunState::kComplete : RunState::kPartial;
+    end_reason_ = end_reason.empty() ? "complete" : end_reason;
+    outcome.ledger = ledger();
+    const std::string hash = writer_.finish(outcome.state, outcome.ledger);
+    outcome.statistics = summarizer.finish(hash);
+    return outcome;
+  }
+
+  std::int64_t id() const { return writer_.id(); }
+
+  void report(const std::function<void(const LogProgress&)>& progress) const {
+    if (!progress) return;
+    const Ledger now = ledger();
+    progress({.elapsed_s = static_cast<double>(now.frames_emitted) / rate_hz_,
+              .duration_s = settings_.duration_s,
+              .silent = watchdog_.silent(),
+              .mean_counts = sink_.means(),
+              .ledger = &now});
+  }
+
+ private:
+  /// The reason to end, or nothing.
+  std::string take(const Block& block, Reader& reader) {
+    packets_.set_time(block.time_s);
+    decoder_.push(block.bytes, packets_);
+    if (block.status == ReadResult::Status::kEnd) {
+      decoder_.finish(packets_);
+      return tracker_.complete() ? "" : "the source ended";
+    }
+    switch (watchdog_.look(tracker_.ledger().frames_stored, block.time_s)) {
+      case Watchdog::Verdict::kFine:
+        break;
+      case Watchdog::Verdict::kBecameSilent:
+        ++silences_;
+        [[fallthrough]];
+      case Watchdog::Verdict::kStillSilent:
+        reader.ask_to_reopen();
+        break;
+      case Watchdog::Verdict::kGiveUp:
+        return fmt::format("no frame for {:g} s", settings_.give_up_s);
+    }
+    return "";
+  }
+
+  Ledger ledger() const {
+    Ledger ledger = tracker_.ledger();
+    ledger.packets_corrupt += decoder_.corrupt();
+    ledger.bytes_skipped = decoder_.bytes_skipped();
+    ledger.silences = silences_;
+    ledger.end_reason = end_reason_;
+    ledger.source = source_name_;
+    return ledger;
+  }
+
+  void commit_when_due() {
+    if (!writer_.pending()) {
+      oldest_pending_ = Clock::time_point::max();
+      return;
+    }
+    const auto now = Clock::now();
+    oldest_pending_ = std::min(oldest_pending_, now);
+    if (now - oldest_pending_ < settings_.commit_interval) return;
+    writer_.commit(ledger());
+    oldest_pending_ = Clock::time_point::max();
+  }
+
+  const LogSettings& settings_;
+  double rate_hz_;
+  PacketDecoder decoder_;
+  LossTracker tracker_;
+  RawWriter writer_;
+  RunSink sink_;
+  TrackerSink packets_;
+  Watchdog watchdog_;
+  std::string source_name_;
+  std::uint64_t silences_ = 0;
+  std::string end_reason_;
+  Clock::time_point oldest_pending_ = Clock::time_point::max();
+};
+
+std::string name_of_run(const RunCells& cells) {
+  const auto found =
+      std::find_if(cells.begin(), cells.end(), [](const auto& cell) { return cell.first == "run"; });
+  if (found == cells.end() || found->second.empty()) throw InputError("a run needs a name");
+  return found->second;
+}
+
+}  // namespace
+
+LogOutcome log_run(PacketSource& source, CampaignFile& file, const RunCells& run, const LogSettings& settings,
+                   const SummarizerFactory& summarizer_factory,
+                   const std::function<void(const LogProgress&)>& progress, const std::atomic<bool>& stop) {
+  const CampaignInfo info = file.info();
+  const auto summarizer = summarizer_factory(info, RawFormat{});
+  std::optional<Recording> recording;
+  file.atomically([&] {
+    file.append_row("runs", run);
+    recording.emplace(file, name_of_run(run), info, settings, *summarizer, source.name());
+  });
+  std::string end_reason;
+  {
+    BlockQueue queue(kQueueLimit);
+    Reader reader(source, queue);
+    end_reason = recording->record(queue, reader, progress, stop);
+  }
+  LogOutcome outcome;
+  file.atomically([&] {
+    outcome = recording->finish(*summarizer, end_reason);
+    if (outcome.statistics.frames > 0) store_statistics(file, recording->id(), outcome.statistics);
+  });
+  recording->report(progress);
+  return outcome;
+}
+
+}  // namespace tunnelrig

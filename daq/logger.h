@@ -1,0 +1,61 @@
+// One run from a source into the campaign file: read, decode, account, store, sum up.
+#pragma once
+
+#include "daq/packet_source.h"
+#include "datasets/campaign_file.h"
+#include "datasets/raw_store.h"
+#include "datasets/run_summarizer.h"
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace tunnelrig {
+
+struct LogSettings {
+  double duration_s = 60;
+
+  /// What was received longer ago than this is on the disk. With the time of a sync it keeps the promise that
+  /// a kill costs at most the last 0.1 s.
+  std::chrono::milliseconds commit_interval{75};
+
+  double silence_s = 1;   // without a new frame for so long, the source counts as silent and is reopened
+  double give_up_s = 30;  // and after so long the run ends as partial
+
+  std::filesystem::path
+      capture;  // the bytes as received go here too, for `--source replay:FILE`; empty: nowhere
+};
+
+struct LogProgress {
+  double elapsed_s = 0;  // of the run, by the board's count of frames
+  double duration_s = 0;
+  bool silent = false;
+  std::array<double, 4> mean_counts{};  // of the frames so far
+  const Ledger* ledger = nullptr;
+};
+
+struct LogOutcome {
+  RunState state = RunState::kPartial;
+  Ledger ledger;
+  RunStatistics statistics;
+};
+
+/// A run as it enters the sheet of runs: column and text, "run" among them.
+using RunCells = std::vector<std::pair<std::string, std::string>>;
+
+/// Records one run of int16 frames. The row and the raw run appear together at the start; frames follow,
+/// durable within settings.commit_interval; statistics and state at the end. `progress` is called several
+/// times a second, `stop` ends the run early (state partial).
+///
+/// Throws InputError where the run exists, StorageError where the disk is full or fails: everything committed
+/// before stays.
+LogOutcome log_run(PacketSource& source, CampaignFile& file, const RunCells& run, const LogSettings& settings,
+                   const SummarizerFactory& summarizer,
+                   const std::function<void(const LogProgress&)>& progress, const std::atomic<bool>& stop);
+
+}  // namespace tunnelrig

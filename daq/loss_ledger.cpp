@@ -1,0 +1,125 @@
+#include "daq/loss_ledger.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunnelrig {
+namespace {
+
+/// A jump of 2^40 frames is 26 years of the rig: such a number is not believed, whatever its checksum says.
+constexpr std::uint64_t kImplausibleJump = std::uint64_t{1} << 40;
+constexpr std::uint64_t kHighestSequence = std::uint64_t{1} << 62;
+
+/// Late frames are looked up in this many of the newest gaps.
+constexpr std::size_t kRememberedGaps = 256;
+
+const std::uint8_t* frame_at(const Packet& packet, std::size_t index) {
+  return reinterpret_cast<const std::uint8_t*>(packet.frames.data()) + index * TRW_FRAME_SIZE;
+}
+
+std::uint16_t status_of(const Packet& packet, std::size_t index) {
+  return trw_get16(frame_at(packet, index) + 2 * TRW_CHANNELS);
+}
+
+double rate_of(const trw_header& header) {
+  return header.ticks_per_frame == 0 ? 0.0 : static_cast<double>(header.tick_hz) / header.ticks_per_frame;
+}
+
+}  // namespace
+
+void LossTracker::start(const trw_header& header) {
+  started_ = true;
+  boot_id_ = header.boot_id;
+  next_sequence_ = header.first_sequence;
+  ledger_.boot_id = header.boot_id;
+  ledger_.first_sequence = header.first_sequence;
+  if (rate_of(header) > 0) ledger_.board_rate_hz = rate_of(header);
+}
+
+void LossTracker::lose(std::uint64_t frames, const char* cause, bool estimated, FrameSink& sink) {
+  if (frames_wanted_ != 0) frames = std::min(frames, frames_wanted_ - ledger_.frames_emitted);
+  if (frames == 0) return;
+  ledger_.frames_lost += frames;
+  ledger_.frames_emitted += frames;
+  sink.gap(
+      {.first_frame = ledger_.frames_stored, .frames_lost = frames, .cause = cause, .estimated = estimated});
+}
+
+/// Follows the board through a reboot. False where the packet is a straggler from before one.
+bool LossTracker::follow_boot(const trw_header& header, double time_s, FrameSink& sink) {
+  if (header.boot_id == boot_id_) return true;
+  if (std::find(past_boots_.begin(), past_boots_.end(), header.boot_id) != past_boots_.end()) return false;
+  past_boots_.push_back(boot_id_);
+  boot_id_ = header.boot_id;
+  ++ledger_.reboots;
+  const double between = std::round((time_s - last_time_s_) * rate_of(header)) - header.frame_count;
+  const auto by_clock = static_cast<std::uint64_t>(std::clamp(between, 0.0, 1e15));
+  lose(std::max({by_clock, header.first_sequence, std::uint64_t{1}}), "reboot", true, sink);
+  next_sequence_ = header.first_sequence;
+  lost_ranges_.clear();
+  return true;
+}
+
+void LossTracker::take(const Packet& packet, double time_s, FrameSink& sink) {
+  const trw_header& header = packet.header;
+  if (complete()) return;
+  if (header.first_sequence > kHighestSequence) {
+    ++ledger_.packets_corrupt;
+    return;
+  }
+  if (!started_) start(header);
+  if (!follow_boot(header, time_s, sink)) {
+    ledger_.frames_late += header.frame_count;
+    return;
+  }
+  const std::uint64_t first = header.first_sequence;
+  if (first > next_sequence_ + kImplausibleJump) {
+    ++ledger_.packets_corrupt;
+    return;
+  }
+  std::size_t known = 0;  // frames of the packet whose numbers have passed already
+  if (first < next_sequence_) {
+    known = static_cast<std::size_t>(std::min<std::uint64_t>(next_sequence_ - first, header.frame_count));
+    drop(first, known);
+  } else if (first > next_sequence_) {
+    const bool overrun = (status_of(packet, 0) & TRW_STATUS_OVERRUN) != 0;
+    lost_ranges_.emplace_back(next_sequence_, first);
+    if (lost_ranges_.size() > kRememberedGaps) lost_ranges_.erase(lost_ranges_.begin());
+    lose(first - next_sequence_, overrun ? "overrun" : "lost", false, sink);
+  }
+  if (known < header.frame_count) {
+    pass(packet, known, header.frame_count - known, sink);
+    next_sequence_ = first + header.frame_count;
+    last_time_s_ = time_s;
+  }
+}
+
+void LossTracker::pass(const Packet& packet, std::size_t first, std::size_t count, FrameSink& sink) {
+  if (frames_wanted_ != 0) {
+    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, frames_wanted_ - ledger_.frames_emitted));
+  }
+  if (count == 0) return;
+  samples_.clear();
+  for (std::size_t i = first; i < first + count; ++i) {
+    trw_frame frame;
+    trw_get_frame(frame_at(packet, i), &frame);
+    samples_.insert(samples_.end(), std::begin(frame.sample), std::end(frame.sample));
+    if ((frame.status & TRW_STATUS_OVERRUN) != 0) ++ledger_.frames_overrun;
+    if ((frame.status & TRW_STATUS_ADC_ERROR) != 0) ++ledger_.frames_adc_error;
+  }
+  ledger_.frames_stored += count;
+  ledger_.frames_emitted += count;
+  sink.frames(std::as_bytes(std::span(samples_)));
+}
+
+/// Counts frames whose numbers have passed: late where they were booked as lost, duplicates otherwise.
+void LossTracker::drop(std::uint64_t first_sequence, std::uint64_t count) {
+  for (std::uint64_t sequence = first_sequence; sequence < first_sequence + count; ++sequence) {
+    const bool was_lost = std::any_of(lost_ranges_.rbegin(), lost_ranges_.rend(), [&](const auto& range) {
+      return sequence >= range.first && sequence < range.second;
+    });
+    ++(was_lost ? ledger_.frames_late : ledger_.frames_duplicate);
+  }
+}
+
+}  // namespace tunnelrig

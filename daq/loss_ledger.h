@@ -1,0 +1,53 @@
+// Packets to frames without a silent loss: numbers decide what was lost, doubled or late.
+#pragma once
+
+#include "daq/packet_decoder.h"
+#include "datasets/raw_store.h"
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace tunnelrig {
+
+/// Follows the sequence numbers of one run. Every frame between the first one seen and the last is either
+/// passed on or in a gap; frames come out in ascending order, so a frame that arrives behind a later one is
+/// counted and dropped.
+///
+/// A change of the boot id is a reboot: a gap whose length comes from the time between the packets
+/// (`estimated`), because the board's own count starts anew. docs/loss-ledger.md.
+class LossTracker {
+ public:
+  /// The run ends when `frames_wanted` frames are accounted for (stored or lost); 0: never.
+  explicit LossTracker(std::uint64_t frames_wanted) : frames_wanted_(frames_wanted) {}
+
+  /// Takes a packet that was received at `time_s`; passes its frames (int16 × 4) and the gap before them to
+  /// `sink`.
+  void take(const Packet& packet, double time_s, FrameSink& sink);
+
+  bool complete() const { return frames_wanted_ != 0 && ledger_.frames_emitted >= frames_wanted_; }
+
+  /// The sums so far. The counts that only others know (corrupt packets, silences) are theirs to fill in.
+  const Ledger& ledger() const { return ledger_; }
+
+ private:
+  void start(const trw_header& header);
+  bool follow_boot(const trw_header& header, double time_s, FrameSink& sink);
+  void lose(std::uint64_t frames, const char* cause, bool estimated, FrameSink& sink);
+  void pass(const Packet& packet, std::size_t first, std::size_t count, FrameSink& sink);
+  void drop(std::uint64_t first_sequence, std::uint64_t count);
+
+  std::uint64_t frames_wanted_;
+  Ledger ledger_;
+  bool started_ = false;
+  std::uint32_t boot_id_ = 0;
+  std::vector<std::uint32_t> past_boots_;
+  std::uint64_t next_sequence_ = 0;
+  double last_time_s_ = 0;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>>
+      lost_ranges_;                    // [first, end) of this boot, newest last
+  std::vector<std::int16_t> samples_;  // of one packet
+};
+
+}  // namespace tunnelrig

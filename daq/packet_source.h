@@ -1,0 +1,48 @@
+// The seam to whatever delivers packets: a board on TCP, serial or USB, a recorded stream, the virtual rig.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace tunnelrig {
+
+struct ReadResult {
+  enum class Status {
+    kData,     // `size` bytes were read, at least one
+    kNothing,  // no byte came within the time-out
+    kBroken,   // the connection is gone; reopen may bring it back
+    kEnd,      // there will never be another byte
+  };
+  Status status = Status::kNothing;
+  std::size_t size = 0;
+  double time_s =
+      0;  // when the bytes (or their absence) were seen, on a clock of the source that never runs backwards
+};
+
+/// A stream of bytes in which packets stand (docs/wire-format.md). Used by one thread at a time.
+class PacketSource {
+ public:
+  virtual ~PacketSource() = default;
+
+  /// Waits for bytes, at most for `timeout`. Never throws for what a device or a cable does.
+  virtual ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds timeout) = 0;
+
+  /// Tries once, without waiting long, to get a silent or broken stream back. True where it may now deliver
+  /// again.
+  virtual bool reopen() = 0;
+
+  /// As the ledger names it: "tcp:localhost:4000".
+  virtual std::string name() const = 0;
+};
+
+/// Opens "tcp:HOST:PORT", "serial:DEVICE[@BAUD]" or "replay:FILE". Throws InputError naming the source and
+/// what is wrong with it. (The virtual rig needs more than a name: virtual_rig.h.)
+std::unique_ptr<PacketSource> open_source(const std::string& name);
+
+/// Seconds on the clock of a source that runs in real time.
+double steady_seconds();
+
+}  // namespace tunnelrig

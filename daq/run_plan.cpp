@@ -1,0 +1,198 @@
+#include "daq/run_plan.h"
+
+#include "datasets/error.h"
+#include "datasets/locations.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <random>
+#include <set>
+#include <tuple>
+
+namespace tunnelrig {
+namespace {
+
+/// Some repeats at one location, one after the other: moving the rig takes longer than a run.
+struct Visit {
+  PlannedLocation location;
+  std::vector<int> repeats;
+};
+
+void check(const PlanSettings& settings) {
+  if (settings.repeats < 2)
+    throw InputError(fmt::format("--repeats {}: at least 2, or there is no scatter", settings.repeats));
+  if (settings.visits < 2 || settings.visits > settings.repeats) {
+    throw InputError(
+        fmt::format("--visits {}: from 2 (or sessions and locations cannot be told apart) to the {} repeats",
+                    settings.visits, settings.repeats));
+  }
+  if (settings.runs_per_session < 4) throw InputError("--runs-per-session: at least 4");
+  if (!(settings.duration_s > 0)) throw InputError("--duration: seconds, above 0");
+}
+
+/// Deals every location's visits out to as many different sessions, each time the emptiest ones, ties by chance; so
+/// sessions fill evenly and hang together through many pairs of locations.
+std::vector<std::vector<Visit>> assign_visits(std::vector<PlannedLocation> locations, const PlanSettings& settings,
+                                              std::mt19937_64& engine) {
+  const auto visits = static_cast<std::size_t>(settings.visits);
+  const std::size_t runs = locations.size() * static_cast<std::size_t>(settings.repeats);
+  const auto per_session = static_cast<std::size_t>(settings.runs_per_session);
+  std::vector<std::vector<Visit>> sessions(std::max((runs + per_session - 1) / per_session, visits));
+  std::vector<std::size_t> order(sessions.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::shuffle(locations.begin(), locations.end(), engine);
+  for (const PlannedLocation& location : locations) {
+    std::shuffle(order.begin(), order.end(), engine);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return sessions[a].size() < sessions[b].size(); });
+    for (std::size_t v = 0; v < visits; ++v) {
+      Visit visit{location, {}};
+      for (auto repeat = static_cast<int>(v) + 1; repeat <= settings.repeats; repeat += settings.visits) {
+        visit.repeats.push_back(repeat);
+      }
+      sessions[order[v]].push_back(visit);
+    }
+  }
+  for (auto& session : sessions) std::shuffle(session.begin(), session.end(), engine);
+  return sessions;
+}
+
+class PlanWriter {
+ public:
+  explicit PlanWriter(const PlanSettings& settings) : settings_(settings) {}
+
+  void add_sessions(const std::vector<PlannedLocation>& locations, const std::string& anchor,
+                    std::mt19937_64& engine) {
+    if (locations.empty()) return;
+    for (const auto& visits : assign_visits(locations, settings_, engine)) add_session(visits, anchor);
+  }
+
+  std::vector<PlannedRun> take() { return std::move(plan_); }
+
+ private:
+  void add_session(const std::vector<Visit>& visits, const std::string& anchor) {
+    session_ = fmt::format("S{}", ++sessions_);
+    add_tare(visits.front().location.label, 1);
+    int since_anchor = 0;
+    if (settings_.anchor_every > 0) add_anchor(anchor);
+    for (const Visit& visit : visits) {
+      for (const int repeat : visit.repeats) {
+        if (settings_.anchor_every > 0 && since_anchor == settings_.anchor_every) {
+          add_anchor(anchor);
+          since_anchor = 0;
+        }
+        plan_.push_back({session_, RunKind::kThrust, visit.location.label, repeat, settings_.duration_s,
+                         visit.location.y_norm, visit.location.z_norm});
+        ++since_anchor;
+      }
+    }
+    add_tare(visits.back().location.label, 2);
+  }
+
+  void add_tare(const std::string& location, int repeat) {
+    plan_.push_back({session_, RunKind::kTare, location, repeat, settings_.duration_s, {}, {}});
+  }
+
+  /// Anchors are repeats of their location beyond the planned ones.
+  void add_anchor(const std::string& anchor) {
+    const int repeat = settings_.repeats + ++anchors_[anchor];
+    plan_.push_back({session_, RunKind::kThrust, anchor, repeat, settings_.duration_s, {}, {}});
+  }
+
+  const PlanSettings& settings_;
+  std::vector<PlannedRun> plan_;
+  std::string session_;
+  int sessions_ = 0;
+  std::map<std::string, int> anchors_;
+};
+
+}  // namespace
+
+PlanSettings thesis_plan() {
+  PlanSettings settings;
+  for (const std::string& label : tunnel_grid()) settings.tunnel.push_back({label, {}, {}});
+  for (const std::string& label : open_space_grid()) settings.open_space.push_back({label, {}, {}});
+  return settings;
+}
+
+std::vector<PlannedRun> make_plan(const PlanSettings& settings) {
+  check(settings);
+  if (settings.tunnel.empty() && settings.open_space.empty())
+    throw InputError("there is no location to plan for");
+  std::mt19937_64 engine(settings.seed);
+  PlanWriter writer(settings);
+  writer.add_sessions(settings.tunnel, "OT", engine);
+  writer.add_sessions(settings.open_space, "OS", engine);
+  return writer.take();
+}
+
+Sheet plan_sheet(const std::vector<PlannedRun>& plan) {
+  Sheet sheet{.file = "",
+              .columns = {"session", "kind", "location", "repeat", "duration_s", "y_norm", "z_norm"},
+              .rows = {}};
+  const auto optional_text = [](std::optional<double> value) {
+    return value ? fmt::format("{}", *value) : std::string();
+  };
+  for (const PlannedRun& run : plan) {
+    sheet.rows.push_back({{run.session, run.kind == RunKind::kTare ? "tare" : "thrust", run.location,
+                           fmt::format("{}", run.repeat), fmt::format("{:g}", run.duration_s),
+                           optional_text(run.y_norm), optional_text(run.z_norm)},
+                          0});
+  }
+  return sheet;
+}
+
+std::vector<PlannedRun> parse_plan(const Sheet& sheet) {
+  std::vector<PlannedRun> plan;
+  std::set<std::tuple<std::string, RunKind, std::string, int>> seen;
+  for (const char* column : {"session", "location", "repeat"}) sheet.require(column);
+  for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
+    PlannedRun run;
+    run.session = sheet.text(row, "session");
+    run.location = sheet.text(row, "location");
+    if (run.session.empty() || run.location.empty()) {
+      throw InputError::at(sheet.file, sheet.rows[row].line, "session and location must not be empty");
+    }
+    const std::string& kind = sheet.text(row, "kind");
+    if (!kind.empty() && kind != "thrust" && kind != "tare") {
+      throw InputError(fmt::format("{}: '{}' is neither thrust nor tare", sheet.where(row, "kind"), kind));
+    }
+    run.kind = kind == "tare" ? RunKind::kTare : RunKind::kThrust;
+    run.repeat = sheet.require_integer(row, "repeat", 0, std::numeric_limits<int>::max());
+    run.duration_s = sheet.number(row, "duration_s").value_or(run.duration_s);
+    if (run.duration_s <= 0 || run.duration_s > 1e5) {
+      throw InputError(
+          fmt::format("{}: {:g} s is no duration of a run", sheet.where(row, "duration_s"), run.duration_s));
+    }
+    run.y_norm = sheet.number(row, "y_norm");
+    run.z_norm = sheet.number(row, "z_norm");
+    if (!seen.emplace(run.session, run.kind, run.location, run.repeat).second) {
+      throw InputError::at(sheet.file, sheet.rows[row].line, "session {}, {} {}, repeat {} is planned twice",
+                           run.session, kind.empty() ? "thrust" : kind, run.location, run.repeat);
+    }
+    plan.push_back(std::move(run));
+  }
+  if (plan.empty()) throw InputError::in(sheet.file, "plans no run");
+  return plan;
+}
+
+std::vector<PlannedLocation> parse_locations(const Sheet& sheet) {
+  sheet.require("location");
+  std::vector<PlannedLocation> locations;
+  for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
+    PlannedLocation location{sheet.text(row, "location"), sheet.number(row, "y_norm"),
+                             sheet.number(row, "z_norm")};
+    if (location.label.empty())
+      throw InputError(fmt::format("{}: must not be empty", sheet.where(row, "location")));
+    if (location.y_norm.has_value() != location.z_norm.has_value()) {
+      throw InputError::at(sheet.file, sheet.rows[row].line, "one of y_norm and z_norm is missing");
+    }
+    locations.push_back(location);
+  }
+  if (locations.empty()) throw InputError::in(sheet.file, "names no location");
+  return locations;
+}
+
+}  // namespace tunnelrig

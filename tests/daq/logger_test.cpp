@@ -1,0 +1,189 @@
+// What a kill, a full disk and an impatient user do to a run.
+#include "daq/logger.h"
+
+#include "daq/logging.h"
+#include "daq/packets.h"
+#include "daq/virtual_board.h"
+#include "datasets/error.h"
+#include "datasets/sqlite.h"
+#include "datasets/statistics_store.h"
+
+#include <csignal>
+#include <cstdlib>
+#include <memory>
+#include <thread>
+
+#include <gtest/gtest.h>
+#include <sys/mount.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace tunnelrig {
+namespace {
+
+constexpr double kRate_hz = 4000.0 / 3.0;
+
+VirtualBoard counting_board(double pace) {
+  auto next = std::make_shared<std::uint64_t>(0);
+  return VirtualBoard({.frame_rate_hz = kRate_hz, .pace = pace}, [next] {
+    trw_frame frame{};
+    for (std::size_t c = 0; c < 4; ++c) frame.sample[c] = test::sample_of(*next, c);
+    ++*next;
+    return frame;
+  });
+}
+
+TEST(Logger, StoresExactlyTheRun) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  VirtualBoard board = counting_board(0);
+  double last_elapsed = -1;
+  const LogOutcome outcome = log_run(
+      board, file, test::cells("R1"), {.duration_s = 12, .capture = folder / "bytes"}, test::summarizer(),
+      [&](const LogProgress& progress) { last_elapsed = progress.elapsed_s; }, test::never_stop());
+  EXPECT_EQ(outcome.state, RunState::kComplete);
+  EXPECT_EQ(outcome.ledger.frames_stored, 16000u);
+  EXPECT_EQ(outcome.ledger.source, "virtual");
+  EXPECT_NEAR(last_elapsed, 12, 1e-9);
+  EXPECT_EQ(file.runs().at(0).run, "R1");
+  EXPECT_EQ(all_statistics(file).at(raw_run(file, "R1")->id).hash, raw_run(file, "R1")->hash);
+
+  // and the captured bytes replay to the same run
+  const auto replay = open_source("replay:" + (folder / "bytes").string());
+  log_run(*replay, file, test::cells("R2"), {.duration_s = 12}, test::summarizer(), {}, test::never_stop());
+  EXPECT_EQ(raw_run(file, "R2")->hash, raw_run(file, "R1")->hash);
+}
+
+TEST(Logger, UserMayStopARun) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  VirtualBoard board = counting_board(1);
+  std::atomic<bool> stop{false};
+  std::thread user([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(600));
+    stop = true;
+  });
+  const LogOutcome outcome =
+      log_run(board, file, test::cells("R1"), {.duration_s = 60}, test::summarizer(), {}, stop);
+  user.join();
+  EXPECT_EQ(outcome.state, RunState::kPartial);
+  EXPECT_EQ(outcome.ledger.end_reason, "stopped by the user");
+  EXPECT_NEAR(static_cast<double>(outcome.ledger.frames_stored), 0.6 * kRate_hz, 0.3 * kRate_hz);
+}
+
+TEST(Logger, ARunIsNotRecordedTwice) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  for (const bool first : {true, false}) {
+    VirtualBoard board = counting_board(0);
+    const auto log = [&] {
+      log_run(board, file, test::cells("R1"), {.duration_s = 1}, test::summarizer(), {}, test::never_stop());
+    };
+    if (first) {
+      log();
+    } else {
+      EXPECT_THROW(log(), InputError);
+    }
+  }
+  EXPECT_EQ(file.runs().size(), 1u) << "the refused run left a row behind";
+}
+
+/// Counts in shared memory what the sink was given, so that the parent knows what the child had received when
+/// it died.
+TEST(Logger, AKillCostsAtMostTheLastTenthOfASecond) {
+  const unsigned seed = static_cast<unsigned>(::getpid());
+  SCOPED_TRACE(seed);
+  std::srand(seed);
+  for (int round = 0; round < 6; ++round) {
+    const test::TemporaryFolder folder;
+    const auto path = folder / "c.db";
+    const pid_t child = ::fork();
+    if (child == 0) {
+      CampaignFile file = test::new_campaign(path);
+      VirtualBoard board = counting_board(1);
+      log_run(board, file, test::cells("R1"), {.duration_s = 60}, test::summarizer(), {}, test::never_stop());
+      ::_exit(0);
+    }
+    // The board starts within a few milliseconds of the run's row; from then on its clock is ours.
+    double started_s = 0;
+    while (started_s == 0) {
+      try {
+        const CampaignFile reader(path, CampaignFile::Access::kRead);
+        if (raw_run(reader, "R1")) started_s = steady_seconds();
+      } catch (const std::exception&) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(300 + std::rand() % 700));
+    const double lived_s = steady_seconds() - started_s;
+    ::kill(child, SIGKILL);
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFSIGNALED(status));
+
+    CampaignFile file(path, CampaignFile::Access::kRecord);  // the lock went with the process
+    EXPECT_EQ(file.integrity_problems(), "");
+    EXPECT_EQ(close_interrupted_runs(file), std::vector<std::string>{"R1"});
+    const RawRun run = raw_run(file, "R1").value();
+    EXPECT_EQ(run.state, RunState::kPartial);
+    test::FrameList list;
+    read_raw(file, run, list);
+    for (std::size_t i = 0; i < list.count(); ++i) ASSERT_EQ(list.samples[4 * i], test::sample_of(i, 0));
+    EXPECT_TRUE(ledger_of(file, run.id)->closed());
+    // 12 ms are one packet, which a board cannot send before it is full; the rest is scheduling on a busy
+    // machine.
+    EXPECT_GE(static_cast<double>(list.count()) / kRate_hz, lived_s - 0.100 - 0.012 - 0.050)
+        << "after " << lived_s << " s";
+  }
+}
+
+/// A small file system of its own, or a skipped test where one may not be mounted.
+class SmallDisk {
+ public:
+  SmallDisk(const std::filesystem::path& where, const char* size) : where_(where) {
+    std::filesystem::create_directory(where);
+    mounted_ = ::mount("tmpfs", where.c_str(), "tmpfs", 0, size) == 0;
+  }
+  ~SmallDisk() {
+    if (mounted_) ::umount2(where_.c_str(), MNT_DETACH);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+  bool mounted() const { return mounted_; }
+
+ private:
+  std::filesystem::path where_;
+  bool mounted_ = false;
+};
+
+TEST(Logger, AFullDiskEndsTheRunAndKeepsWhatCameBefore) {
+  const test::TemporaryFolder folder;
+  const SmallDisk disk(folder / "disk", "size=3m");
+  if (!disk.mounted()) GTEST_SKIP() << "mounting a small file system needs root";
+  const auto path = folder / "disk" / "c.db";
+  {
+    CampaignFile file = test::new_campaign(path);
+    VirtualBoard board = counting_board(0);
+    try {
+      log_run(board, file, test::cells("R1"),
+              {.duration_s = 3600, .commit_interval = std::chrono::milliseconds(5)}, test::summarizer(), {},
+              test::never_stop());
+      FAIL() << "38 MB went onto a disk of 3 MB";
+    } catch (const StorageError& error) {
+      EXPECT_TRUE(error.disk_full()) << error.what();
+    }
+  }
+  // The reader of what is left needs a little room for SQLite's own index of the journal.
+  ASSERT_EQ(::mount("tmpfs", (folder / "disk").c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
+  CampaignFile file(path, CampaignFile::Access::kRecord);
+  EXPECT_EQ(file.integrity_problems(), "");
+  EXPECT_EQ(close_interrupted_runs(file), std::vector<std::string>{"R1"});
+  const RawRun run = raw_run(file, "R1").value();
+  EXPECT_GT(run.frames, 1000u);
+  test::FrameList list;
+  read_raw(file, run, list);
+  for (std::size_t i = 0; i < list.count(); ++i) ASSERT_EQ(list.samples[4 * i], test::sample_of(i, 0));
+}
+
+}  // namespace
+}  // namespace tunnelrig

@@ -1,0 +1,116 @@
+#include "daq/loss_ledger.h"
+
+#include "daq/packets.h"
+
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using test::FrameList;
+using test::PacketSpec;
+
+/// Feeds packets through the decoder into a tracker at given times.
+struct Tracking {
+  explicit Tracking(std::uint64_t wanted = 0) : tracker(wanted) {}
+
+  void take(const PacketSpec& spec, double time_s = 0) {
+    struct Into : PacketSink {
+      Into(LossTracker& t, FrameSink& s, double at) : tracker(t), sink(s), time_s(at) {}
+      void packet(const Packet& packet) override { tracker.take(packet, time_s, sink); }
+      LossTracker& tracker;
+      FrameSink& sink;
+      double time_s;
+    } into(tracker, list, time_s);
+    PacketDecoder decoder;
+    decoder.push(test::packet_bytes(spec), into);
+    EXPECT_TRUE(tracker.ledger().closed());
+    EXPECT_EQ(list.count(), tracker.ledger().frames_stored);
+  }
+
+  LossTracker tracker;
+  FrameList list;
+};
+
+TEST(LossLedger, NothingLostNothingBooked) {
+  Tracking t;
+  for (std::uint64_t i = 0; i < 10; ++i) t.take({.first = 1000 + 16 * i});
+  EXPECT_EQ(t.tracker.ledger().frames_stored, 160u);
+  EXPECT_EQ(t.tracker.ledger().first_sequence, 1000u);
+  EXPECT_EQ(t.tracker.ledger().board_rate_hz, 1000);
+  EXPECT_TRUE(t.list.gaps.empty());
+  for (std::size_t i = 0; i < 160; ++i) EXPECT_EQ(t.list.samples[4 * i], test::sample_of(1000 + i, 0));
+}
+
+TEST(LossLedger, AJumpIsAGapWithItsLengthAndCause) {
+  Tracking t;
+  t.take({.first = 0});
+  t.take({.first = 48});
+  t.take({.first = 100, .first_status = TRW_STATUS_OVERRUN});
+  ASSERT_EQ(t.list.gaps.size(), 2u);
+  EXPECT_EQ(t.list.gaps[0], (Gap{16, 32, "lost", false}));
+  EXPECT_EQ(t.list.gaps[1], (Gap{32, 36, "overrun", false}));
+  EXPECT_EQ(t.tracker.ledger().frames_overrun, 1u);
+}
+
+TEST(LossLedger, DuplicatesAndLateFramesAreToldApartAndDropped) {
+  Tracking t;
+  t.take({.first = 0});
+  t.take({.first = 0});   // again
+  t.take({.first = 32});  // 16…31 missing
+  t.take({.first = 16});  // there they are, too late
+  t.take({.first = 40});  // half known, half new
+  EXPECT_EQ(t.tracker.ledger().frames_duplicate, 16u + 8u);
+  EXPECT_EQ(t.tracker.ledger().frames_late, 16u);
+  EXPECT_EQ(t.tracker.ledger().frames_lost, 16u);
+  EXPECT_EQ(t.tracker.ledger().frames_stored, 16u + 16u + 8u);
+  EXPECT_EQ(t.list.samples.back(), test::sample_of(55, 3));
+}
+
+TEST(LossLedger, ARebootIsAGapNotARestart) {
+  Tracking t;
+  t.take({.first = 5000, .boot = 7}, 10.000);
+  t.take({.first = 32, .boot = 8}, 10.500);  // 0.5 s at 1000 frames/s, 16 of them in the packet
+  ASSERT_EQ(t.list.gaps.size(), 1u);
+  EXPECT_EQ(t.list.gaps[0], (Gap{16, 484, "reboot", true}));
+  EXPECT_EQ(t.tracker.ledger().reboots, 1u);
+  t.take({.first = 5016, .boot = 7}, 10.6);  // a straggler from before
+  EXPECT_EQ(t.tracker.ledger().frames_late, 16u);
+  t.take({.first = 48, .boot = 8}, 10.6);
+  EXPECT_EQ(t.list.gaps.size(), 1u);
+}
+
+TEST(LossLedger, WithoutAClockARebootCountsWhatIsCertain) {
+  Tracking t;
+  t.take({.first = 5000, .boot = 7});
+  t.take({.first = 32, .boot = 8});
+  EXPECT_EQ(t.list.gaps[0].frames_lost, 32u);
+}
+
+TEST(LossLedger, EndsAtTheWantedNumberOfFrames) {
+  Tracking exact(40);
+  for (std::uint64_t i = 0; i < 4; ++i) exact.take({.first = 16 * i});
+  EXPECT_TRUE(exact.tracker.complete());
+  EXPECT_EQ(exact.list.count(), 40u);
+
+  Tracking lost(40);
+  lost.take({.first = 0});
+  lost.take({.first = 1000});  // the end of the run lies in the gap
+  EXPECT_TRUE(lost.tracker.complete());
+  EXPECT_EQ(lost.tracker.ledger().frames_lost, 24u);
+  EXPECT_EQ(lost.list.count(), 16u);
+}
+
+TEST(LossLedger, AbsurdNumbersAreNotBelieved) {
+  Tracking t;
+  t.take({.first = 0});
+  t.take({.first = std::uint64_t{1} << 50});
+  t.take({.first = ~std::uint64_t{0} - 3});
+  EXPECT_EQ(t.tracker.ledger().packets_corrupt, 2u);
+  EXPECT_EQ(t.tracker.ledger().frames_lost, 0u);
+  t.take({.first = 16});
+  EXPECT_EQ(t.tracker.ledger().frames_stored, 32u);
+}
+
+}  // namespace
+}  // namespace tunnelrig

@@ -1,0 +1,130 @@
+// TCP and serial against real sockets and a real terminal; a peer that hangs up, and one that falls silent.
+#include "daq/logging.h"
+#include "daq/packets.h"
+#include "datasets/error.h"
+#include "support/message_of.h"
+
+#include <array>
+#include <fstream>
+#include <thread>
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <pty.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+namespace tunnelrig {
+namespace {
+
+/// A board on a TCP port of this machine.
+class Server {
+ public:
+  Server() : listener_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::bind(listener_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    EXPECT_EQ(::listen(listener_, 4), 0);
+    socklen_t length = sizeof address;
+    ::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &length);
+    port_ = ntohs(address.sin_port);
+  }
+  ~Server() { ::close(listener_); }
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  int accept() const { return ::accept(listener_, nullptr, nullptr); }
+  std::string name() const { return "tcp:127.0.0.1:" + std::to_string(port_); }
+
+ private:
+  int listener_;
+  int port_ = 0;
+};
+
+/// Sends frames [from, to) in packets of 16, at the pace of the rig where asked.
+void send_frames(int fd, std::uint64_t from, std::uint64_t to, bool paced) {
+  for (std::uint64_t first = from; first < to; first += 16) {
+    const auto bytes = test::packet_bytes({.first = first});
+    ASSERT_EQ(::write(fd, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
+    if (paced) std::this_thread::sleep_for(std::chrono::milliseconds(12));
+  }
+}
+
+TEST(Tcp, AHangUpIsAGapAndTheRunGoesOn) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  const Server server;
+  std::thread board([&] {
+    const int first = server.accept();
+    send_frames(first, 0, 800, true);
+    ::close(first);
+    const int second = server.accept();
+    send_frames(second, 1600, 8000, false);
+    ::close(second);
+  });
+  const auto source = open_source(server.name());
+  const LogOutcome outcome = log_run(*source, file, test::cells("R1"), {.duration_s = 6}, test::summarizer(),
+                                     {}, test::never_stop());
+  board.join();
+  EXPECT_EQ(outcome.state, RunState::kComplete);
+  EXPECT_EQ(outcome.ledger.frames_emitted, 8000u);
+  EXPECT_EQ(outcome.ledger.frames_lost, 800u);
+  EXPECT_EQ(outcome.ledger.source, server.name());
+}
+
+TEST(Tcp, SilenceIsNoticedAndTheSourceReopened) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  const Server server;
+  std::thread board([&] {
+    const int first = server.accept();
+    send_frames(first, 0, 160, true);
+    const int second = server.accept();  // nothing was closed: the logger came back by itself
+    send_frames(second, 160, 2000, false);
+    ::close(second);
+    ::close(first);
+  });
+  const auto source = open_source(server.name());
+  bool seen_silent = false;
+  const LogOutcome outcome = log_run(
+      *source, file, test::cells("R1"), {.duration_s = 1.5}, test::summarizer(),
+      [&](const LogProgress& progress) { seen_silent |= progress.silent; }, test::never_stop());
+  board.join();
+  EXPECT_TRUE(seen_silent);
+  EXPECT_EQ(outcome.ledger.silences, 1u);
+  EXPECT_EQ(outcome.ledger.frames_lost, 0u);
+  EXPECT_EQ(outcome.state, RunState::kComplete);
+}
+
+TEST(Serial, ReadsARawTerminal) {
+  int master = -1, slave = -1;
+  std::array<char, 128> name{};
+  ASSERT_EQ(::openpty(&master, &slave, name.data(), nullptr, nullptr), 0);
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  const auto source = open_source(std::string("serial:") + name.data() + "@115200");
+  std::thread board([&] { send_frames(master, 0, 2000, true); });
+  const LogOutcome outcome = log_run(*source, file, test::cells("R1"), {.duration_s = 1}, test::summarizer(),
+                                     {}, test::never_stop());
+  board.join();
+  EXPECT_EQ(outcome.state, RunState::kComplete);
+  EXPECT_EQ(outcome.ledger.frames_lost, 0u) << "every byte value must pass, 0x03 and 0x11 too";
+  ::close(slave);
+  ::close(master);
+}
+
+TEST(Sources, NamesAreChecked) {
+  using test::message_of;
+  EXPECT_NE(message_of([] { open_source("usbx"); }).find("is no source"), std::string::npos);
+  EXPECT_NE(message_of([] { open_source("tcp:nowhere"); }).find("write tcp:HOST:PORT"), std::string::npos);
+  EXPECT_NE(message_of([] { open_source("tcp:127.0.0.1:1"); }).find("cannot be opened: Connection refused"),
+            std::string::npos);
+  EXPECT_NE(message_of([] { open_source("serial:/dev/none"); }).find("No such file"), std::string::npos);
+  EXPECT_NE(message_of([] { open_source("serial:/dev/ttyS0@12"); }).find("baud rate"), std::string::npos);
+  EXPECT_NE(message_of([] { open_source("replay:/nowhere"); }).find("cannot be read"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tunnelrig

@@ -1,0 +1,231 @@
+#include "datasets/campaign_folder.h"
+
+#include "analysis/run_summary.h"
+#include "datasets/error.h"
+#include "datasets/raw_store.h"
+#include "datasets/statistics_store.h"
+#include "support/example_campaign.h"
+#include "support/message_of.h"
+#include "support/temporary_folder.h"
+
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <map>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+namespace fs = std::filesystem;
+using test::message_of;
+using testing::HasSubstr;
+
+ImportOptions options() {
+  ImportOptions options;
+  options.summarizer = [](const CampaignInfo& info, const RawFormat& format) {
+    return make_run_summarizer(info, format);
+  };
+  return options;
+}
+
+/// Every file of a folder: relative path and bytes.
+std::map<std::string, std::string> contents(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) files[fs::relative(entry.path(), folder).string()] = read_text(entry.path());
+  }
+  return files;
+}
+
+void replace(std::string& text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  ASSERT_NE(at, std::string::npos) << from;
+  text.replace(at, from.size(), to);
+}
+
+struct Folder : testing::Test {
+  test::TemporaryFolder folder;
+  test::ExampleCampaign campaign;
+  fs::path source = folder / "source", db = folder / "c.db";
+
+  /// What the import says of the campaign as it now is; nothing of it may be stored.
+  std::string refusal() {
+    fs::remove_all(source);
+    campaign.write(source);
+    return import_refusal();
+  }
+  std::string import_refusal() {
+    const std::string said = message_of([&] { import_campaign_folder(source, db, options()); });
+    EXPECT_FALSE(fs::exists(db)) << "something was stored of a campaign that was refused";
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1)
+        << "files were left behind";
+    return said;
+  }
+};
+
+TEST_F(Folder, ExportGivesBackEveryByte) {
+  campaign.runs_csv =
+      "run,location,operator,repeat,session,start_utc,raw,y_norm,z_norm,air_temperature_C,fan_rpm\n"
+      "R1,OT,\"Kim, \"\"K\"\"\",01,S1,2026-03-02T08:00:00Z,raw/R1.npy,0,0, 20.50,\n"
+      "R2,H4V-2,,1,S1,2026-03-02T08:05:00.000Z,raw/R2.npy,0.80,-0.64,20.7,1e3\n"
+      "R3,OS,Åse,1,S2,2026-03-03T08:00:00Z,raw/R3.npy,,,18,7\n";
+  campaign.write(source);
+  write_text(source / "raw/R2.gaps.csv",
+             "first_frame,frames_lost,cause,estimated\n10,3,lost,0\n10,500,reboot,1\n400,2,,0\n");
+  const RawFormat floats{SampleType::kFloat64, 4};
+  test::write_npy(source / "raw/R3.npy", floats, 400, test::example_frames(400, 9, floats));
+  import_campaign_folder(source, db, options());
+  const CampaignFile file(db, CampaignFile::Access::kRead);
+  export_campaign_folder(file, folder / "out", {});
+  EXPECT_EQ(contents(folder / "out"), contents(source));
+}
+
+class FolderTypes : public Folder, public testing::WithParamInterface<SampleType> {};
+
+TEST_P(FolderTypes, ArraysKeepTypeAndValues) {
+  campaign.write(source);
+  const RawFormat format{GetParam(), 4};
+  test::write_npy(source / "raw/R1.npy", format, 777, test::example_frames(777, 5, format));
+  import_campaign_folder(source, db, options());
+  export_campaign_folder(CampaignFile(db, CampaignFile::Access::kRead), folder / "out", {});
+  EXPECT_EQ(read_text(folder / "out/raw/R1.npy"), read_text(source / "raw/R1.npy"));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, FolderTypes,
+                         testing::Values(SampleType::kInt16, SampleType::kUInt16, SampleType::kFloat32,
+                                         SampleType::kFloat64),
+                         [](const auto& type) { return std::string(name_of(type.param)); });
+
+TEST_F(Folder, StatisticsAreStoredWithTheHashOfTheirData) {
+  campaign.write(source, 4000);
+  const ImportSummary summary = import_campaign_folder(source, db, options());
+  EXPECT_EQ(summary.runs, 3u);
+  EXPECT_EQ(summary.frames, 12000u);
+  const CampaignFile file(db, CampaignFile::Access::kRead);
+  const RawRun run = raw_run(file, "R2").value();
+  const auto statistics = all_statistics(file);
+  EXPECT_EQ(statistics.at(run.id).hash, run.hash);
+  EXPECT_EQ(statistics.at(run.id).frames, 4000u);
+  EXPECT_NEAR(statistics.at(run.id).channels[0].mean_V, 2600 * 3.3 / 4096, 0.002);
+}
+
+TEST_F(Folder, OneCampaignPerFile) {
+  campaign.write(source);
+  import_campaign_folder(source, db, options());
+  EXPECT_THAT(message_of([&] { import_campaign_folder(source, db, options()); }),
+              HasSubstr("already holds a campaign"));
+  ImportOptions replacing = options();
+  replacing.replace = true;
+  EXPECT_NO_THROW(import_campaign_folder(source, db, replacing));
+  EXPECT_EQ(CampaignFile(db, CampaignFile::Access::kRead).integrity_problems(), "");
+}
+
+TEST_F(Folder, AFailedReplacementLeavesTheOldCampaign) {
+  campaign.write(source);
+  import_campaign_folder(source, db, options());
+  fs::remove(source / "raw/R3.npy");
+  ImportOptions replacing = options();
+  replacing.replace = true;
+  EXPECT_THAT(message_of([&] { import_campaign_folder(source, db, replacing); }),
+              HasSubstr("the raw file raw/R3.npy is missing"));
+  EXPECT_EQ(CampaignFile(db, CampaignFile::Access::kRead).runs().size(), 3u);
+}
+
+TEST_F(Folder, RefusesBadFolders) {
+  EXPECT_THAT(message_of([&] { import_campaign_folder(source, db, options()); }),
+              HasSubstr("there is no such campaign folder"));
+  campaign.write(source);
+  fs::remove(source / "calibration.csv");
+  EXPECT_THAT(import_refusal(), HasSubstr("the file calibration.csv is missing"));
+  fs::remove(source / "campaign.toml");
+  EXPECT_THAT(import_refusal(), HasSubstr("the file campaign.toml is missing"));
+}
+
+TEST_F(Folder, RefusesBadRuns) {
+  replace(campaign.runs_csv, "raw/R2.npy", "../R2.npy");
+  EXPECT_THAT(refusal(), HasSubstr("runs.csv:3: column raw: '../R2.npy' must be a path inside"));
+  campaign = {};
+  replace(campaign.runs_csv, "20.7", "-300");
+  EXPECT_THAT(refusal(), HasSubstr("runs.csv:3: column air_temperature_C: -300"));
+  campaign = {};
+  replace(campaign.calibration_csv, "2,1,", "7,1,");
+  EXPECT_THAT(refusal(), HasSubstr("calibration.csv:12: column cell: '7' is not a whole number from 1 to 4"));
+  campaign = {};
+  replace(campaign.propellers_csv, "CCW,7.45", "left,7.45");
+  EXPECT_THAT(refusal(), HasSubstr("propellers.csv:4: column direction: 'left' is neither CW nor CCW"));
+}
+
+TEST_F(Folder, RefusesBadRawData) {
+  campaign.write(source);
+  test::write_npy(source / "raw/R2.npy", {}, 0, {});
+  EXPECT_THAT(import_refusal(), HasSubstr("runs.csv:3: run R2: raw/R2.npy holds zero frames"));
+
+  const RawFormat floats{SampleType::kFloat32, 4};
+  auto data = test::example_frames(50, 1, floats);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(data.data() + 30 * 16 + 8, &nan, sizeof nan);
+  test::write_npy(source / "raw/R2.npy", floats, 50, data);
+  EXPECT_THAT(import_refusal(), HasSubstr("raw/R2.npy: frame 30, channel 3 is nan"));
+
+  auto stuck = test::example_frames(50, 1);
+  const std::int16_t same = 2048;
+  for (std::size_t i = 0; i < 50; ++i) std::memcpy(stuck.data() + i * 8 + 6, &same, 2);
+  test::write_npy(source / "raw/R2.npy", {}, 50, stuck);
+  EXPECT_THAT(import_refusal(), HasSubstr("runs.csv:3: run R2: channel 4 of raw/R2.npy is stuck at 1.65 V"));
+
+  auto beyond = test::example_frames(50, 1);
+  const std::int16_t large = 4096;
+  std::memcpy(beyond.data(), &large, 2);
+  test::write_npy(source / "raw/R2.npy", {}, 50, beyond);
+  EXPECT_THAT(import_refusal(), HasSubstr("leaves the converter's range of 12 bits"));
+
+  test::write_npy(source / "raw/R2.npy", {}, 50, test::example_frames(50, 1));
+  write_text(source / "raw/R2.gaps.csv", "first_frame,frames_lost\n51,3\n");
+  EXPECT_THAT(import_refusal(),
+              HasSubstr("R2.gaps.csv:2: column first_frame: 51 is no frame index from 0 to 50"));
+}
+
+TEST_F(Folder, TakesAStuckChannelWhenAsked) {
+  campaign.write(source);
+  auto stuck = test::example_frames(50, 1);
+  for (std::size_t i = 0; i < 50; ++i) std::memset(stuck.data() + i * 8 + 6, 4, 2);
+  test::write_npy(source / "raw/R2.npy", {}, 50, stuck);
+  ImportOptions lenient = options();
+  lenient.allow_stuck = true;
+  EXPECT_NO_THROW(import_campaign_folder(source, db, lenient));
+}
+
+TEST_F(Folder, TakesRunsWithThrustsInTheRow) {
+  campaign.runs_csv =
+      "run,location,repeat,session,start_utc,raw,thrust_1_N,thrust_2_N,thrust_3_N,thrust_4_N\n"
+      "R1,OT,1,S1,2026-03-02T08:00:00Z,,7.1,7.2,7.3,7.4\n";
+  campaign.write(source);
+  import_campaign_folder(source, db, options());
+  const auto runs = CampaignFile(db, CampaignFile::Access::kRead).runs();
+  EXPECT_EQ(runs[0].thrust_N[3], 7.4);
+}
+
+TEST_F(Folder, ExportNeverOverwrites) {
+  campaign.write(source);
+  import_campaign_folder(source, db, options());
+  const CampaignFile file(db, CampaignFile::Access::kRead);
+  EXPECT_THAT(message_of([&] { export_campaign_folder(file, source, {}); }),
+              HasSubstr("is not an empty folder"));
+  fs::create_directory(folder / "empty");
+  EXPECT_NO_THROW(export_campaign_folder(file, folder / "empty", {}));
+}
+
+TEST(SharedExample, RoundTrip) {
+  SKIP_WITHOUT_SHARED_DATA();
+  const test::TemporaryFolder folder;
+  const fs::path source = test::shared_data() / "example_campaign";
+  import_campaign_folder(source, folder / "c.db", options());
+  export_campaign_folder(CampaignFile(folder / "c.db", CampaignFile::Access::kRead), folder / "out", {});
+  EXPECT_EQ(contents(folder / "out"), contents(source));
+}
+
+}  // namespace
+}  // namespace tunnelrig

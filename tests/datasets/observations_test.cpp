@@ -1,0 +1,138 @@
+#include "datasets/observations.h"
+
+#include "datasets/rcbenchmark.h"
+#include "support/message_of.h"
+#include "support/temporary_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using test::message_of;
+using testing::HasSubstr;
+
+const char* const kSchema = R"TOML(format = "tunnelrig-table/1"
+name = "bench"
+groups = ["prop", "motor"]
+blocks = "bins(N, 4)"
+hold_out = "N > 5000"
+
+[response]
+column = "T"
+unit = "gf"
+meaning = "thrust_N"
+
+[speed]
+column = "N"
+unit = "rpm"
+electrical = true
+pole_count = 14
+
+[propeller]
+diameter_column = "D"
+diameter_unit = "in"
+
+[[covariates]]
+column = "Tair"
+unit = "K"
+meaning = "air_temperature_C"
+)TOML";
+
+const char* const kTable = "prop,motor,T,N,D,Tair\nA,m,1000,35000,10,293.15\nB,m,500,28000,5,300.15\n";
+
+std::string refusal(std::string schema, const std::string& from, const std::string& to,
+                    const std::string& table = kTable) {
+  schema.replace(schema.find(from), from.size(), to);
+  return message_of(
+      [&] { read_observations(parse_csv(table, "t.csv"), parse_table_schema(schema, "s.toml")); });
+}
+
+TEST(Observations, ConvertsToSi) {
+  const auto table = read_observations(parse_csv(kTable, "t.csv"), parse_table_schema(kSchema, "s.toml"));
+  ASSERT_EQ(table.rows.size(), 2u);
+  EXPECT_EQ(table.rows[0].group, "A / m");
+  EXPECT_NEAR(table.rows[0].response, 9.80665, 1e-12);
+  EXPECT_NEAR(table.rows[0].speed_rpm.value(), 5000, 1e-9);  // 14 poles: 7 electrical revolutions to one
+  EXPECT_NEAR(table.rows[0].diameter_m.value(), 0.254, 1e-12);
+  EXPECT_NEAR(table.rows[1].air_temperature_C, 27, 1e-9);
+  EXPECT_EQ(table.schema.hold_out, "N > 5000");
+}
+
+TEST(Observations, NamesWhatIsWrong) {
+  EXPECT_THAT(refusal(kSchema, "unit = \"gf\"", "unit = \"slug\""),
+              HasSubstr("s.toml:7: T: 'slug' is not a known unit"));
+  EXPECT_THAT(refusal(kSchema, "unit = \"gf\"", "unit = \"V\""),
+              HasSubstr("thrust_N is a force, and 'V' is a unit of voltage"));
+  EXPECT_THAT(refusal(kSchema, "column = \"T\"", "column = \"thrust\""),
+              HasSubstr("t.csv:1: the required column thrust is missing"));
+  EXPECT_THAT(refusal(kSchema, "pole_count = 14\n", ""), HasSubstr("speed.pole_count is required"));
+  EXPECT_THAT(refusal(kSchema, "bins(N, 4)", "bins(N)"), HasSubstr("blocks = \"bins(N)\""));
+  EXPECT_THAT(refusal(kSchema, "bins(N, 4)", "day"), HasSubstr("the required column day is missing"));
+  EXPECT_THAT(refusal(kSchema, "\"air_temperature_C\"", "\"warmth\""),
+              HasSubstr("'warmth' is no known meaning"));
+  EXPECT_THAT(refusal(kSchema, "name", "name", "prop,motor,T,N,D,Tair\nA,m,,35000,10,293.15\n"),
+              HasSubstr("t.csv:2: column T: the response must not be empty"));
+  EXPECT_THAT(refusal(kSchema, "name", "name", "prop,motor,T,N,D,Tair\nA,m,1,35000,10,-3\n"),
+              HasSubstr("-3 K is below absolute zero"));
+  EXPECT_THAT(refusal(kSchema, "name", "name", "prop,motor,T,N,D,Tair\nA,m,nan,35000,10,3\n"),
+              HasSubstr("t.csv:2: column T: 'nan'"));
+  EXPECT_THAT(refusal(kSchema, "name", "name", "prop,motor,T,N,D,Tair\n"), HasSubstr("holds no row"));
+}
+
+TEST(Observations, StoredAndReadBack) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "t.csv", kTable);
+  write_text(folder / "s.toml", kSchema);
+  EXPECT_EQ(import_table(folder / "t.csv", folder / "s.toml", folder / "c.db", false), 2u);
+  EXPECT_THAT(message_of([&] { import_table(folder / "t.csv", folder / "s.toml", folder / "c.db", false); }),
+              HasSubstr("already holds"));
+  const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+  EXPECT_EQ(observations_of(file).rows.size(), 2u);
+  EXPECT_THAT(message_of([&] { (void)file.info(); }),
+              HasSubstr("holds a table of observations, no campaign of runs"));
+}
+
+TEST(Rcbenchmark, TakesSpeedFromTheProbeThatWasThere) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "s.csv",
+             "Time (s),ESC signal (µs),Thrust (gf),Voltage (V),Motor Electrical Speed (RPM),Motor Optical "
+             "Speed (RPM)\n"
+             "0,1000,10,11,3000,0\n1,1200,40,11,6000,0\n");
+  import_rcbenchmark(folder / "s.csv", folder / "c.db", {.propeller_diameter_m = 0.127});
+  const auto table = observations_of(CampaignFile(folder / "c.db", CampaignFile::Access::kRead));
+  EXPECT_EQ(table.rows[1].speed_rpm, 6000);
+  EXPECT_EQ(table.rows[1].diameter_m, 0.127);
+  EXPECT_EQ(table.rows[1].group, "s.csv");
+  EXPECT_NEAR(table.rows[1].response, 0.04 * 9.80665, 1e-12);
+}
+
+TEST(Rcbenchmark, SweepsTableNamesGroups) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "in");
+  for (const char* name : {"a.csv", "b.csv"}) {
+    write_text(folder / "in" / name, "Thrust (N),Motor Optical Speed (RPM)\n1,3000\n");
+  }
+  write_text(folder / "sweeps.csv", "file,group,propeller_diameter_m\na.csv,G,0.1\nb.csv,G,0.2\n");
+  EXPECT_EQ(import_rcbenchmark(folder / "in", folder / "c.db", {.sweeps_csv = folder / "sweeps.csv"}), 2u);
+  const auto table = observations_of(CampaignFile(folder / "c.db", CampaignFile::Access::kRead));
+  EXPECT_EQ(table.rows[0].group, "G");
+  EXPECT_EQ(table.rows[1].diameter_m, 0.2);
+  write_text(folder / "short.csv", "file,group\na.csv,G\n");
+  EXPECT_THAT(message_of([&] {
+                import_rcbenchmark(folder / "in", folder / "d.db", {.sweeps_csv = folder / "short.csv"});
+              }),
+              HasSubstr("has no row for b.csv"));
+}
+
+TEST(Rcbenchmark, StrawsonMotors) {
+  SKIP_WITHOUT_SHARED_DATA();
+  const test::TemporaryFolder folder;
+  const auto rows = import_rcbenchmark(test::shared_data() / "strawson_motors/rawdata", folder / "c.db",
+                                       {.propeller_diameter_m = 0.127});
+  EXPECT_GT(rows, 2000u);
+}
+
+}  // namespace
+}  // namespace tunnelrig

@@ -1,0 +1,157 @@
+#include "datasets/raw_store.h"
+
+#include "datasets/error.h"
+#include "datasets/sqlite.h"
+#include "datasets/statistics_store.h"
+#include "support/example_campaign.h"
+#include "support/message_of.h"
+#include "support/temporary_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using test::message_of;
+using testing::HasSubstr;
+using Access = CampaignFile::Access;
+
+/// Notes down what it is given.
+class Notes : public FrameSink {
+ public:
+  void frames(std::span<const std::byte> data) override {
+    bytes.insert(bytes.end(), data.begin(), data.end());
+  }
+  void gap(const Gap& gap) override { gaps.emplace_back(bytes.size() / 8, gap); }
+
+  std::vector<std::byte> bytes;
+  std::vector<std::pair<std::size_t, Gap>> gaps;  // with the number of frames before it
+};
+
+struct RawStore : testing::Test {
+  test::TemporaryFolder folder;
+  CampaignFile file{folder / "c.db", Access::kRecord};
+  std::vector<std::byte> data = test::example_frames(1000, 3);
+
+  std::span<const std::byte> frames(std::size_t first, std::size_t count) const {
+    return std::span(data).subspan(first * 8, count * 8);
+  }
+};
+
+TEST_F(RawStore, GivesBackFramesAndGapsInOrder) {
+  RawWriter writer(file, "R1", {}, 133);
+  const Gap middle{.first_frame = 250, .frames_lost = 17, .cause = "lost"};
+  const Gap reboot{.first_frame = 250, .frames_lost = 99, .cause = "reboot", .estimated = true};
+  const Gap end{.first_frame = 1000, .frames_lost = 5, .cause = "lost"};
+  writer.frames(frames(0, 250));
+  writer.gap(middle);
+  writer.gap(reboot);
+  writer.frames(frames(250, 300));
+  writer.commit(Ledger{.frames_emitted = 666, .frames_stored = 550, .frames_lost = 116});
+  writer.frames(frames(550, 450));
+  writer.gap(end);
+  const std::string hash = writer.finish(
+      RunState::kComplete, Ledger{.frames_emitted = 1121, .frames_stored = 1000, .frames_lost = 121});
+
+  const RawRun run = raw_run(file, "R1").value();
+  EXPECT_EQ(run.frames, 1000u);
+  EXPECT_EQ(run.state, RunState::kComplete);
+  EXPECT_EQ(run.hash, hash);
+  Notes notes;
+  read_raw(file, run, notes);
+  EXPECT_EQ(notes.bytes, data);
+  ASSERT_EQ(notes.gaps.size(), 3u);
+  EXPECT_EQ(notes.gaps[0], std::make_pair(std::size_t{250}, middle));
+  EXPECT_EQ(notes.gaps[1], std::make_pair(std::size_t{250}, reboot));
+  EXPECT_EQ(notes.gaps[2], std::make_pair(std::size_t{1000}, end));
+  EXPECT_TRUE(ledger_of(file, run.id)->closed());
+}
+
+TEST_F(RawStore, BlobsHoldATenthOfASecondAtMost) {
+  RawWriter writer(file, "R1", {}, 133);
+  writer.frames(frames(0, 1000));
+  writer.finish(RunState::kComplete, {});
+  EXPECT_LE(file.database().scalar_integer("SELECT max(length(data)) FROM raw_chunks"), 133 * 8);
+}
+
+TEST_F(RawStore, HashDoesNotDependOnHowFramesWereCut) {
+  RawWriter one(file, "R1", {}, 133), other(file, "R2", {}, 50);
+  one.frames(frames(0, 1000));
+  for (std::size_t i = 0; i < 1000; i += 125) {
+    other.frames(frames(i, 125));
+    other.commit({});
+  }
+  EXPECT_EQ(one.finish(RunState::kComplete, {}), other.finish(RunState::kComplete, {}));
+}
+
+TEST_F(RawStore, DamageIsFoundAndNamed) {
+  RawWriter writer(file, "R1", {}, 100);
+  writer.frames(frames(0, 1000));
+  writer.finish(RunState::kComplete, {});
+  const RawRun run = raw_run(file, "R1").value();
+  Notes notes;
+  file.database().execute("UPDATE raw_chunks SET data = zeroblob(800) WHERE (id & 4294967295) = 300");
+  try {
+    read_raw(file, run, notes);
+    FAIL() << "a damaged blob was read";
+  } catch (const StorageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("run R1: the raw data at frame 300 are damaged"));
+  }
+  file.database().execute("DELETE FROM raw_chunks WHERE (id & 4294967295) >= 300");
+  EXPECT_THROW(read_raw(file, run, notes), StorageError) << "missing blobs at the end";
+}
+
+TEST_F(RawStore, InterruptedRunsBecomePartial) {
+  {
+    RawWriter writer(file, "R1", {}, 100);
+    writer.frames(frames(0, 500));
+    writer.commit(Ledger{.frames_emitted = 500, .frames_stored = 500});
+    writer.frames(frames(500, 100));  // never committed, as when the process is killed
+  }
+  EXPECT_THAT(close_interrupted_runs(file), testing::ElementsAre("R1"));
+  const RawRun run = raw_run(file, "R1").value();
+  EXPECT_EQ(run.state, RunState::kPartial);
+  EXPECT_EQ(run.frames, 500u);
+  EXPECT_THAT(run.hash, HasSubstr("xxh3:"));
+  EXPECT_TRUE(close_interrupted_runs(file).empty());
+}
+
+TEST_F(RawStore, RunsAreNamedOnce) {
+  RawWriter writer(file, "R1", {}, 100);
+  EXPECT_THAT(message_of([&] { RawWriter(file, "R1", {}, 100); }), HasSubstr("run R1 is in"));
+}
+
+TEST_F(RawStore, StatisticsComeBackAsStored) {
+  const RawWriter writer(file, "R1", {}, 100);
+  RunStatistics statistics{.hash = "xxh3:0", .frames = 9, .window_s = 0.25, .window_means_V = {1, 2, 3, 4}};
+  statistics.channels.push_back({.mean_V = 1.5,
+                                 .std_V = 0.1,
+                                 .standard_error_V = 0.01,
+                                 .drift_V = 0.2,
+                                 .drift_z = 3,
+                                 .lowest_V = 0,
+                                 .highest_V = 3,
+                                 .clipped = 4,
+                                 .shaft_hz = 83.3,
+                                 .lines = {{83.3, 0.2, 900, "shaft"}}});
+  statistics.channels.push_back({.mean_V = 1});
+  store_statistics(file, writer.id(), statistics);
+  auto all = all_statistics(file);
+  read_windows(file, all);
+  const RunStatistics& read = all.at(writer.id());
+  EXPECT_EQ(read.hash, "xxh3:0");
+  EXPECT_EQ(read.frames, 9u);
+  EXPECT_EQ(read.window_means_V, statistics.window_means_V);
+  ASSERT_EQ(read.channels.size(), 2u);
+  EXPECT_EQ(read.channels[0].mean_V, 1.5);
+  EXPECT_EQ(read.channels[0].drift_z, 3);
+  EXPECT_EQ(read.channels[0].clipped, 4u);
+  EXPECT_EQ(read.channels[0].shaft_hz, 83.3);
+  ASSERT_EQ(read.channels[0].lines.size(), 1u);
+  EXPECT_EQ(read.channels[0].lines[0].name, "shaft");
+  EXPECT_FALSE(read.channels[1].shaft_hz.has_value());
+}
+
+}  // namespace
+}  // namespace tunnelrig
