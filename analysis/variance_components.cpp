@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <unsupported/Eigen/SpecialFunctions>
 
 namespace tunnelrig {

@@ -106,9 +106,13 @@ CampaignFile::CampaignFile(const std::filesystem::path& path, Access access) : p
       if (!std::filesystem::exists(path, error)) std::filesystem::remove(with_suffix(path, suffix), error);
     }
   }
-  const int flags = access == Access::kRead    ? SQLITE_OPEN_READONLY
-                    : access == Access::kWrite ? SQLITE_OPEN_READWRITE
-                                               : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  // A reader that may write opens for writing all the same: SQLite lets only such a connection fold the
+  // journal back into the file when it closes last, and a campaign should be one file wherever it can.
+  const bool writable = ::access(path.c_str(), W_OK) == 0 &&
+                        ::access(path.parent_path().empty() ? "." : path.parent_path().c_str(), W_OK) == 0;
+  const int flags = access == Access::kRecord              ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE
+                    : access == Access::kWrite || writable ? SQLITE_OPEN_READWRITE
+                                                           : SQLITE_OPEN_READONLY;
   database_ = std::make_unique<Database>(path.string(), flags);
   try {
     check_kind_of_file(*database_, path.string());
@@ -119,6 +123,7 @@ CampaignFile::CampaignFile(const std::filesystem::path& path, Access access) : p
     if (empty() && database_->scalar_integer("PRAGMA user_version") == 0) {
       throw InputError::in(path.string(), "is an empty file, no campaign");
     }
+    database_->execute("PRAGMA query_only = ON");
   } else {
     database_->execute(fmt::format("PRAGMA page_size = {}", kPageSize));
     make_durable(*database_, path.string());

@@ -15,6 +15,8 @@
 namespace tunnelrig {
 namespace {
 
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t");
   if (first == std::string_view::npos) return {};
@@ -174,7 +176,7 @@ int Sheet::require_integer(std::size_t row, std::string_view column, int lowest,
 }
 
 Sheet parse_csv(std::string_view text, const std::string& file) {
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   check_encoding(text, file);
   Sheet sheet{.file = file, .columns = {}, .rows = {}};
   Scanner scanner(text, file);
@@ -202,7 +204,8 @@ std::string format_csv(const Sheet& sheet) {
   const auto append = [&out](const std::vector<std::string>& cells) {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       if (i > 0) out.push_back(',');
-      if (cells[i].find_first_of(",\"\r\n") == std::string::npos) {
+      // A byte order mark that belongs to the text must not come to stand at the start of the file.
+      if (cells[i].find_first_of(",\"\r\n") == std::string::npos && !cells[i].starts_with(kByteOrderMark)) {
         out += cells[i];
         continue;
       }

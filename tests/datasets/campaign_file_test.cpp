@@ -65,6 +65,22 @@ TEST(CampaignFile, LockGoesWithItsOwner) {
   EXPECT_NO_THROW(CampaignFile(folder / "c.db", Access::kRecord));
 }
 
+TEST(CampaignFile, IsOneFileAgainWhenItsLastReaderIsDone) {
+  const test::TemporaryFolder folder;
+  {
+    CampaignFile file(folder / "c.db", Access::kRecord);
+    file.set_text("campaign.toml", reference_campaign_toml());
+  }
+  {
+    const CampaignFile reader(folder / "c.db", Access::kRead);
+    CampaignFile(folder / "c.db", Access::kWrite).add_document("reduction", {"", "", "{}"}, "{}");
+    EXPECT_THROW(const_cast<CampaignFile&>(reader).set_text("x", "y"), StorageError)
+        << "a reader cannot write";
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "c.db-wal"));
+  EXPECT_TRUE(CampaignFile(folder / "c.db", Access::kRead).newest_document("reduction").has_value());
+}
+
 TEST(CampaignFile, RefusesWhatIsNoCampaign) {
   const test::TemporaryFolder folder;
   std::ofstream(folder / "text.db") << std::string(2000, 'x');

@@ -1,0 +1,348 @@
+#include "analysis/location_summary.h"
+
+#include "analysis/conventions.h"
+#include "analysis/variance_components.h"
+#include "calibration/distributions.h"
+#include "datasets/error.h"
+#include "datasets/locations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace tunnelrig {
+namespace {
+
+/// Runs sorted into locations and sessions.
+struct Grouping {
+  std::vector<LocationSummary> locations;
+  std::vector<std::size_t> location_of, session_of;  // by index in Reduction::runs
+};
+
+/// An error that several locations share: parameters with a covariance, and how each location depends on
+/// them.
+struct SharedSource {
+  double Budget::*share;
+  Eigen::MatrixXd covariance;  // of the parameters
+  double dof;
+  Eigen::MatrixXd c_t, u;  // locations × parameters
+};
+
+/// The place of a location in the order of the tables: columns from the centre, top to bottom, then open
+/// space.
+std::tuple<int, double, double, std::string> order_of(const LocationSummary& location) {
+  if (location.y_norm) return {0, *location.y_norm, -*location.z_norm, location.label};
+  for (const auto& [prefix, rank] : {std::pair<const char*, int>{"OS", 1}, {"GND", 2}, {"CEIL", 3}}) {
+    if (const auto distance = distance_of(location.label, prefix))
+      return {rank, *distance, 0, location.label};
+    if (location.label == prefix) return {rank, 0, 0, location.label};
+  }
+  return {4, 0, 0, location.label};
+}
+
+Grouping group(const CampaignData& data, const Reduction& reduction) {
+  Grouping grouping;
+  std::map<std::string, std::size_t> locations, sessions;
+  std::vector<std::string> first_run;
+  for (const RunCoefficients& reduced : reduction.runs) {
+    const Run& run = data.runs[reduced.run];
+    const std::string label = canonical_location(run.location);
+    const auto [found, fresh] = locations.emplace(label, grouping.locations.size());
+    if (fresh) {
+      LocationSummary location;
+      location.label = label;
+      location.y_norm = run.y_norm;
+      location.z_norm = run.z_norm;
+      grouping.locations.push_back(location);
+      first_run.push_back(run.run);
+    }
+    const LocationSummary& location = grouping.locations[found->second];
+    if (location.y_norm != run.y_norm || location.z_norm != run.z_norm) {
+      throw InputError::at("runs.csv", run.line, "run {}: location {} stands elsewhere than in run {}",
+                           run.run, label, first_run[found->second]);
+    }
+    grouping.location_of.push_back(found->second);
+    grouping.session_of.push_back(sessions.emplace(run.session, sessions.size()).first->second);
+  }
+  std::vector<std::size_t> order(grouping.locations.size()), rank(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return order_of(grouping.locations[a]) < order_of(grouping.locations[b]);
+  });
+  std::vector<LocationSummary> sorted;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    rank[order[i]] = i;
+    sorted.push_back(grouping.locations[order[i]]);
+  }
+  grouping.locations = std::move(sorted);
+  for (std::size_t& location : grouping.location_of) location = rank[location];
+  return grouping;
+}
+
+/// Scatter of one quantity: relative for C_T, because what scatters is a factor; absolute for U.
+struct Scatter {
+  LocationMeans means;
+  VarianceComponents components;
+};
+
+Scatter scatter_of(const Grouping& grouping, std::vector<double> values, bool relative) {
+  GroupedRuns runs{
+      .location = grouping.location_of, .session = grouping.session_of, .value = std::move(values)};
+  std::vector<double> scale(grouping.locations.size(), 1.0), count(scale.size());
+  if (relative) {
+    std::fill(scale.begin(), scale.end(), 0);
+    for (std::size_t i = 0; i < runs.value.size(); ++i) {
+      scale[runs.location[i]] += runs.value[i];
+      count[runs.location[i]] += 1;
+    }
+    for (std::size_t l = 0; l < scale.size(); ++l) scale[l] /= count[l];
+  }
+  for (std::size_t i = 0; i < runs.value.size(); ++i) runs.value[i] /= scale[runs.location[i]];
+  Scatter scatter;
+  scatter.components = fit_variance_components(runs);
+  scatter.means = location_means(runs, scatter.components);
+  for (std::size_t l = 0; l < scale.size(); ++l) {
+    const auto row = static_cast<Eigen::Index>(l);
+    const double square = scale[l] * scale[l];
+    scatter.means.mean[l] *= scale[l];
+    scatter.means.std[l] *= scale[l];
+    scatter.means.run_part[l] *= square;
+    scatter.means.visit_part[l] *= square;
+    scatter.means.session_part[l] *= square;
+    scatter.means.covariance.row(row) *= scale[l];
+    scatter.means.covariance.col(row) *= scale[l];
+  }
+  return scatter;
+}
+
+/// Averages, over the runs of each location, of how C_T and U depend on `parameters` values; `slopes` gives
+/// them run by run.
+template <typename Slopes>
+SharedSource shared_source(double Budget::*share, const Grouping& grouping, const Reduction& reduction,
+                           const Rig& rig, const Eigen::MatrixXd& covariance, double dof,
+                           const Slopes& slopes) {
+  const auto locations = static_cast<Eigen::Index>(grouping.locations.size());
+  SharedSource source{share, covariance, dof, Eigen::MatrixXd::Zero(locations, covariance.rows()),
+                      Eigen::MatrixXd::Zero(locations, covariance.rows())};
+  std::vector<double> count(grouping.locations.size());
+  for (std::size_t i = 0; i < reduction.runs.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(grouping.location_of[i]);
+    const auto c_t = c_t_per_thrust(reduction.runs[i], rig);
+    const auto u = u_per_thrust(reduction.runs[i]);
+    // thrust slopes: rotors × parameters
+    const Eigen::MatrixXd thrust = slopes(reduction.runs[i]);
+    for (Eigen::Index rotor = 0; rotor < thrust.rows(); ++rotor) {
+      source.c_t.row(row) += c_t[static_cast<std::size_t>(rotor)] * thrust.row(rotor);
+      source.u.row(row) += u[static_cast<std::size_t>(rotor)] * thrust.row(rotor);
+    }
+    count[grouping.location_of[i]] += 1;
+  }
+  for (Eigen::Index l = 0; l < locations; ++l) {
+    source.c_t.row(l) /= count[static_cast<std::size_t>(l)];
+    source.u.row(l) /= count[static_cast<std::size_t>(l)];
+  }
+  return source;
+}
+
+/// One source per cell: their calibrations are independent, each with its own degrees of freedom.
+void add_calibration(const CampaignData& data, const Grouping& grouping, const Reduction& reduction,
+                     std::vector<SharedSource>& sources) {
+  for (int rotor = 0; data.certificate && rotor < data.info.rig.rotors; ++rotor) {
+    const CellFit& cell = data.certificate->cells[static_cast<std::size_t>(rotor)];
+    sources.push_back(shared_source(&Budget::calibration, grouping, reduction, data.info.rig, cell.covariance,
+                                    cell.dof, [&](const RunCoefficients& run) {
+                                      Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(data.info.rig.rotors, 2);
+                                      slope(rotor, 0) = run.d_zero_N_per_V[static_cast<std::size_t>(rotor)];
+                                      slope(rotor, 1) = run.d_gain_N2_per_V[static_cast<std::size_t>(rotor)];
+                                      return slope;
+                                    }));
+  }
+}
+
+void add_propellers(const CampaignData& data, const Grouping& grouping, const Reduction& reduction,
+                    std::vector<SharedSource>& sources) {
+  if (!data.certificate || !data.certificate->propellers.tested || data.certificate->propellers.dof == 0)
+    return;
+  const PropellerFactors& propellers = data.certificate->propellers;
+  sources.push_back(shared_source(&Budget::propellers, grouping, reduction, data.info.rig,
+                                  propellers.covariance, propellers.dof, [&](const RunCoefficients& run) {
+                                    Eigen::MatrixXd slope =
+                                        Eigen::MatrixXd::Zero(data.info.rig.rotors, data.info.rig.rotors);
+                                    for (Eigen::Index i = 0; i < slope.rows(); ++i) {
+                                      slope(i, i) =
+                                          -run.thrust_N[static_cast<std::size_t>(i)] / propellers.factor(i);
+                                    }
+                                    return slope;
+                                  }));
+}
+
+/// One source per channel, whose parameters are the tares. How the zero wanders between them is the runs' own
+/// and in their scatter.
+void add_tares(const CampaignData& data, const Grouping& grouping, const Reduction& reduction,
+               std::vector<SharedSource>& sources) {
+  const auto& tares = reduction.tares.readings();
+  if (tares.empty()) return;
+  for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
+    const auto channel = static_cast<std::size_t>(rotor);
+    Eigen::VectorXd variance(static_cast<Eigen::Index>(tares.size()));
+    for (std::size_t t = 0; t < tares.size(); ++t) {
+      variance(static_cast<Eigen::Index>(t)) =
+          tares[t].standard_error_V[channel] * tares[t].standard_error_V[channel];
+    }
+    sources.push_back(shared_source(&Budget::tare, grouping, reduction, data.info.rig, variance.asDiagonal(),
+                                    50, [&](const RunCoefficients& run) {
+                                      Eigen::MatrixXd slope =
+                                          Eigen::MatrixXd::Zero(data.info.rig.rotors, variance.size());
+                                      if (!run.tare) return slope;
+                                      for (const TareZero::Weight& weight : run.tare->weights) {
+                                        slope(rotor, static_cast<Eigen::Index>(weight.tare)) =
+                                            run.d_tare_N_per_V[channel] * weight.weight;
+                                      }
+                                      return slope;
+                                    }));
+  }
+}
+
+/// An instrument's own error is the same in every run, so that repeats do not show it: C_T changes by
+/// `relative` of itself, U not.
+void add_instrument(double Budget::*share, double relative, const Grouping& grouping,
+                    const std::vector<double>& c_t, std::vector<SharedSource>& sources) {
+  const auto locations = static_cast<Eigen::Index>(grouping.locations.size());
+  SharedSource source{share, Eigen::MatrixXd::Identity(1, 1), std::numeric_limits<double>::infinity(),
+                      Eigen::MatrixXd::Zero(locations, 1), Eigen::MatrixXd::Zero(locations, 1)};
+  for (Eigen::Index l = 0; l < locations; ++l) source.c_t(l, 0) = relative * c_t[static_cast<std::size_t>(l)];
+  sources.push_back(std::move(source));
+}
+
+void add_instruments(const CampaignData& data, const Grouping& grouping, const Reduction& reduction,
+                     const std::vector<double>& c_t, std::vector<SharedSource>& sources,
+                     std::vector<std::string>& notes) {
+  const InstrumentUncertainty& declared = data.info.uncertainty;
+  double mean_temperature_K = 0;
+  for (const RunCoefficients& run : reduction.runs)
+    mean_temperature_K += run.temperature_K / static_cast<double>(reduction.runs.size());
+  const auto left_out = [&notes](const char* quantity, const char* key) {
+    notes.push_back(
+        fmt::format("{}: the instrument's own error is left out (campaign.toml declares no uncertainty.{}); "
+                    "what changes from run to run is in the scatter",
+                    quantity, key));
+  };
+  if (declared.speed_rpm)
+    add_instrument(&Budget::speed, 2 * *declared.speed_rpm / data.info.rig.nominal_speed_rpm, grouping, c_t,
+                   sources);
+  else
+    left_out("speed", "speed_rpm");
+  if (declared.air_temperature_K)
+    add_instrument(&Budget::temperature, *declared.air_temperature_K / mean_temperature_K, grouping, c_t,
+                   sources);
+  else
+    left_out("temperature", "air_temperature_K");
+  if (!reduction.terms.air_pressure) return;
+  if (declared.air_pressure_Pa)
+    add_instrument(&Budget::pressure, *declared.air_pressure_Pa / 101325, grouping, c_t, sources);
+  else
+    left_out("pressure", "air_pressure_Pa");
+}
+
+void note_components(const VarianceComponents& components, std::vector<std::string>& notes) {
+  if (!components.run_known && !components.visit_known) {
+    notes.emplace_back("repeatability: no location was repeated; the noise within runs stands in for it");
+  }
+  if (!components.session_known) {
+    notes.emplace_back("sessions: no location was measured in two sessions, so their scatter is left out");
+  }
+}
+
+/// One quantity at one location from all its parts.
+LocationValue combine(const LocationMeans& means, std::size_t l, double noise_variance,
+                      const std::vector<SharedSource>& sources, Eigen::MatrixXd SharedSource::*slopes) {
+  const auto row = static_cast<Eigen::Index>(l);
+  LocationValue value{.mean = means.mean[l], .std = means.std[l]};
+  double variance = means.covariance(row, row);
+  double over_dof = variance > 0 && std::isfinite(means.dof[l]) ? variance * variance / means.dof[l] : 0;
+  if (variance <= 0) variance = noise_variance;
+  for (const SharedSource& source : sources) {
+    const Eigen::RowVectorXd slope = (source.*slopes).row(row);
+    const double part = slope * source.covariance * slope.transpose();
+    variance += part;
+    if (std::isfinite(source.dof) && source.dof > 0) over_dof += part * part / source.dof;
+  }
+  value.standard_uncertainty = std::sqrt(variance);
+  value.dof = over_dof > 0 ? variance * variance / over_dof
+                           : std::numeric_limits<double>::infinity();  // Welch–Satterthwaite
+  value.u95 = student_t_quantile(0.975, value.dof) * value.standard_uncertainty;
+  return value;
+}
+
+Budget budget_of(const LocationMeans& means, const VarianceComponents& components, std::size_t l,
+                 double noise_variance, const std::vector<SharedSource>& sources) {
+  Budget budget;
+  // Without repeats within a visit, coming back and repeating are one.
+  budget.run = std::sqrt(components.run_known     ? means.run_part[l]
+                         : components.visit_known ? means.visit_part[l]
+                                                  : noise_variance);
+  budget.visit = components.run_known ? std::sqrt(means.visit_part[l]) : 0;
+  budget.session = std::sqrt(means.session_part[l]);
+  for (const SharedSource& source : sources) {
+    const Eigen::RowVectorXd slope = source.c_t.row(static_cast<Eigen::Index>(l));
+    const double part = slope * source.covariance * slope.transpose();
+    budget.*source.share = std::hypot(budget.*source.share, std::sqrt(part));
+  }
+  return budget;
+}
+
+}  // namespace
+
+Summary summarize_locations(const CampaignData& data, const Reduction& reduction) {
+  Summary summary;
+  const Grouping grouping = group(data, reduction);
+  std::vector<double> c_t, u;
+  for (const RunCoefficients& run : reduction.runs) {
+    c_t.push_back(run.c_t);
+    u.push_back(run.u_percent);
+  }
+  const Scatter c_t_scatter = scatter_of(grouping, c_t, true);
+  const bool has_u = data.info.rig.rotors == kMaxRotors;
+  const Scatter u_scatter = has_u ? scatter_of(grouping, u, false) : Scatter{};
+  note_components(c_t_scatter.components, summary.notes);
+
+  std::vector<SharedSource> sources;
+  add_calibration(data, grouping, reduction, sources);
+  add_propellers(data, grouping, reduction, sources);
+  add_tares(data, grouping, reduction, sources);
+  add_instruments(data, grouping, reduction, c_t_scatter.means.mean, sources, summary.notes);
+
+  summary.locations = grouping.locations;
+  std::vector<double> noise_c_t(summary.locations.size()), noise_u(summary.locations.size());
+  for (LocationSummary& location : summary.locations)
+    location.c_rotor.assign(static_cast<std::size_t>(data.info.rig.rotors), 0);
+  for (std::size_t i = 0; i < reduction.runs.size(); ++i) {
+    const std::size_t l = grouping.location_of[i];
+    const RunCoefficients& run = reduction.runs[i];
+    const auto n = static_cast<double>(c_t_scatter.means.runs[l]);
+    noise_c_t[l] += run.c_t_standard_error * run.c_t_standard_error / (n * n);
+    noise_u[l] += run.u_standard_error * run.u_standard_error / (n * n);
+    LocationSummary& location = summary.locations[l];
+    location.thrust_N += run.total_N / n;
+    for (std::size_t rotor = 0; rotor < location.c_rotor.size(); ++rotor) {
+      location.c_rotor[rotor] += run.thrust_N[rotor] / run.total_N * run.c_t / n;
+    }
+  }
+  for (std::size_t l = 0; l < summary.locations.size(); ++l) {
+    LocationSummary& location = summary.locations[l];
+    location.runs = c_t_scatter.means.runs[l];
+    location.sessions = c_t_scatter.means.sessions[l];
+    location.c_t = combine(c_t_scatter.means, l, noise_c_t[l], sources, &SharedSource::c_t);
+    if (has_u) location.u_percent = combine(u_scatter.means, l, noise_u[l], sources, &SharedSource::u);
+    location.budget = budget_of(c_t_scatter.means, c_t_scatter.components, l, noise_c_t[l], sources);
+  }
+  summary.c_t_covariance = c_t_scatter.means.covariance;
+  summary.u_covariance = has_u ? u_scatter.means.covariance : Eigen::MatrixXd(0, 0);
+  for (const SharedSource& source : sources) {
+    summary.c_t_covariance += source.c_t * source.covariance * source.c_t.transpose();
+    if (has_u) summary.u_covariance += source.u * source.covariance * source.u.transpose();
+  }
+  return summary;
+}
+
+}  // namespace tunnelrig

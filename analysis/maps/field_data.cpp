@@ -1,0 +1,117 @@
+#include "analysis/maps/field_data.h"
+
+#include "analysis/maps/coincident.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// ΔC_T at every location, OT included, where row and column of the covariance are exactly 0.
+struct ThrustChange {
+  Estimates estimates;  // per cent
+  MatrixXd excess;
+};
+
+ThrustChange thrust_change(const MapInput& merged) {
+  const auto origin = static_cast<Index>(index_of_origin(merged.locations));
+  const VectorXd c_t = values_of(merged.locations, &LocationEstimate::c_t);
+  const VectorXd ratio = c_t / c_t(origin);
+  // ∂(C_T,i / C_T0) = (∂C_T,i − ratio_i ∂C_T0) / C_T0
+  MatrixXd jacobian = MatrixXd::Identity(c_t.size(), c_t.size());
+  jacobian.col(origin) -= ratio;
+  const double scale = 100 / c_t(origin);
+  return {
+      {(ratio.array() - 1) * 100, scale * scale * jacobian * merged.c_t_covariance * jacobian.transpose()},
+      jacobian * jacobian.transpose()};
+}
+
+FieldData folded(const MapInput& merged, Parity parity, Estimates estimates, const MatrixXd& excess) {
+  FieldData data{.parity = parity};
+  VectorXd sign = VectorXd::Ones(estimates.values.size());
+  for (Index i = 0; i < sign.size(); ++i) {
+    const LocationEstimate& location = merged.locations[static_cast<std::size_t>(i)];
+    if (parity == Parity::kOdd && location.y_norm < 0) sign(i) = -1;
+    data.points.push_back(folded_position(location));
+  }
+  estimates.values = sign.asDiagonal() * estimates.values;
+  estimates.covariance = sign.asDiagonal() * estimates.covariance * sign.asDiagonal();
+  const Coincidence positions = coincidence(data.points);
+  estimates = merge_coincident(
+      estimates, positions,
+      fmt::format("{}: mirror images differ, and their covariance says that they cannot", merged.source));
+  data.values = estimates.values;
+  data.covariance = estimates.covariance;
+  data.excess = excess(positions.kept, positions.kept);
+  data.points.clear();
+  for (const Index i : positions.kept) {
+    const LocationEstimate& location = merged.locations[static_cast<std::size_t>(i)];
+    data.labels.push_back(location.label);
+    data.points.push_back(folded_position(location));
+  }
+  return data;
+}
+
+}  // namespace
+
+FieldData thrust_change_data(const MapInput& merged) {
+  const ThrustChange change = thrust_change(merged);
+  const FieldData data = folded(merged, Parity::kEven, change.estimates, change.excess);
+  const auto origin = std::find(data.labels.begin(), data.labels.end(),
+                                merged.locations[index_of_origin(merged.locations)].label);
+  return without(data, origin - data.labels.begin());
+}
+
+FieldData uneven_thrust_data(const MapInput& merged) {
+  const auto n = static_cast<Index>(merged.locations.size());
+  return folded(merged, Parity::kOdd,
+                {values_of(merged.locations, &LocationEstimate::u_percent), merged.u_covariance},
+                MatrixXd::Identity(n, n));
+}
+
+FieldData without(const FieldData& data, Index left_out) {
+  FieldData rest{.parity = data.parity};
+  std::vector<Index> kept;
+  for (Index i = 0; i < data.size(); ++i) {
+    if (i == left_out) continue;
+    kept.push_back(i);
+    rest.labels.push_back(data.labels[static_cast<std::size_t>(i)]);
+    rest.points.push_back(data.points[static_cast<std::size_t>(i)]);
+  }
+  rest.values = data.values(kept);
+  rest.covariance = data.covariance(kept, kept);
+  rest.excess = data.excess(kept, kept);
+  return rest;
+}
+
+double thrust_coefficient_at_origin(const MapInput& merged) {
+  return merged.locations[index_of_origin(merged.locations)].c_t;
+}
+
+std::vector<MeasuredLocation> measured_locations(const MapInput& merged, double coverage_factor) {
+  const Estimates change = thrust_change(merged).estimates;
+  const auto u95 = [&](const MatrixXd& covariance, Index i) {
+    return coverage_factor * std::sqrt(std::max(0.0, covariance(i, i)));
+  };
+  std::vector<MeasuredLocation> locations;
+  for (const LocationEstimate& location : merged.locations) {
+    const auto i = static_cast<Index>(locations.size());
+    locations.push_back({.label = location.label,
+                         .y_norm = location.y_norm,
+                         .z_norm = location.z_norm,
+                         .delta_ct_percent = change.values(i),
+                         .delta_ct_u95_percent = u95(change.covariance, i),
+                         .uneven_thrust_percent = location.u_percent,
+                         .uneven_thrust_u95_percent = u95(merged.u_covariance, i)});
+  }
+  return locations;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,52 @@
+// The two fields that a map shows, as observations: the change of thrust against OT, and the uneven thrust.
+#pragma once
+
+#include "analysis/maps/map_input.h"
+#include "datasets/locations.h"
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace tunnelrig {
+
+/// How a field continues on the other side of the tunnel's middle plane.
+enum class Parity {
+  kEven,  // ΔC_T: f(−ȳ, z̄) = f(ȳ, z̄)
+  kOdd    // U: f(−ȳ, z̄) = −f(ȳ, z̄)
+};
+
+/// n observations of a field that is 0 at OT, folded onto ȳ ≥ 0, one per position; per cent throughout.
+struct FieldData {
+  Parity parity = Parity::kEven;
+  std::vector<std::string> labels;
+  std::vector<TunnelPoint> points;  // ȳ ≥ 0
+  Eigen::VectorXd values;
+  Eigen::MatrixXd covariance;  // of the measurement, n × n
+  /// What would be added to `covariance` if each location had one more error of variance 1, independent of
+  /// the others. Not the identity for ΔC_T: OT's share of it reaches every other location.
+  Eigen::MatrixXd excess;
+
+  Eigen::Index size() const { return values.size(); }
+};
+
+/// ΔC_T = (C_T / C_T0 − 1) · 100 (5.2) at every location but OT, where it is 0 by definition; its covariance
+/// by the delta method, so that OT's own error is shared by all others. Takes what merge_locations returns.
+/// Throws InputError where mirror images differ and their covariance says that they cannot.
+FieldData thrust_change_data(const MapInput& merged);
+
+/// U at every location. Takes and throws as thrust_change_data.
+FieldData uneven_thrust_data(const MapInput& merged);
+
+/// One observation fewer.
+FieldData without(const FieldData& data, Eigen::Index left_out);
+
+/// C_T0.
+double thrust_coefficient_at_origin(const MapInput& merged);
+
+/// The locations as measured, on the side of the tunnel where they were; u95 is coverage_factor times the
+/// standard uncertainty.
+std::vector<MeasuredLocation> measured_locations(const MapInput& merged, double coverage_factor);
+
+}  // namespace tunnelrig

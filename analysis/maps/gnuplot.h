@@ -1,0 +1,16 @@
+// gnuplot as a subprocess.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace tunnelrig {
+
+/// Runs `program` in `folder`, a scratch folder where it leaves files of its own, with the script on its
+/// standard input. Returns nothing where it succeeds, else why it did not: not installed, or what it
+/// complains of.
+std::optional<std::string> run_gnuplot(const std::string& program, const std::filesystem::path& folder,
+                                       const std::string& script);
+
+}  // namespace tunnelrig

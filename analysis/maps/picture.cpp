@@ -1,0 +1,154 @@
+#include "analysis/maps/picture.h"
+
+#include "analysis/maps/contour_labels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+/// The lines on one side of ȳ = 0, which no segment crosses: it is a column of the grid.
+std::vector<ContourLine> lines_of_half(const std::vector<ContourLine>& lines, bool right) {
+  std::vector<ContourLine> parts;
+  for (const ContourLine& line : lines) {
+    ContourLine part{.level = line.level};
+    for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
+      const double middle = line.points[i].y_norm + line.points[i + 1].y_norm;
+      if (right ? middle >= 0 : middle < 0) {
+        if (part.points.empty()) part.points.push_back(line.points[i]);
+        part.points.push_back(line.points[i + 1]);
+      } else if (!part.points.empty()) {
+        parts.push_back(std::exchange(part, {.level = line.level}));
+      }
+    }
+    if (!part.points.empty()) parts.push_back(part);
+  }
+  return parts;
+}
+
+std::string polylines(const std::vector<ContourLine>& lines) {
+  std::string out;
+  for (const ContourLine& line : lines) {
+    for (const TunnelPoint& point : line.points)
+      out += fmt::format("{:.5f} {:.5f}\n", point.y_norm, point.z_norm);
+    out += "\n";
+  }
+  return out;
+}
+
+/// Drawn as lines, which both terminals draw alike; points they do not.
+std::string crosses(const std::vector<TunnelPoint>& locations) {
+  constexpr double kArm = 0.017;
+  std::string out;
+  for (const auto& [y, z] : locations) {
+    for (const double slope : {-kArm, kArm}) {
+      out += fmt::format("{:.5f} {:.5f}\n{:.5f} {:.5f}\n\n", y - kArm, z - slope, y + kArm, z + slope);
+    }
+  }
+  return out;
+}
+
+std::string field(const Picture& picture) {
+  std::string out;
+  for (std::size_t row = 0; row < picture.grid.z_norm.size(); ++row) {
+    for (std::size_t column = 0; column < picture.grid.y_norm.size(); ++column) {
+      out += fmt::format("{:.5f} {:.5f} {:.6g}\n", picture.grid.y_norm[column], picture.grid.z_norm[row],
+                         picture.values[picture.grid.index(row, column)]);
+    }
+  }
+  return out;
+}
+
+std::string labels(const std::vector<ContourLabel>& list, bool with_sign) {
+  std::string out;
+  for (const ContourLabel& label : list) {
+    const char* sign = label.level < 0 ? "−" : with_sign && label.level > 0 ? "+" : "";
+    out += fmt::format("{:.5f} {:.5f} \"{}{:g}\"\n", label.at.y_norm, label.at.z_norm, sign,
+                       std::abs(label.level));
+  }
+  return out;
+}
+
+/// Colours and their range. Diverging: ColorBrewer's RdBu, white at 0; seen without the medium-wave cones
+/// (Machado et al. 2009) it runs from blue to brown with monotonic lightness on either side. Sequential: a
+/// straight line in CIELAB from white, in which equal steps look equal, with and without those cones.
+std::string colours(const Picture& picture) {
+  double greatest = 1e-6;
+  for (const double value : picture.values) greatest = std::max(greatest, std::abs(value));
+  const double step = nice_step(greatest / 5), end = step * std::ceil(greatest / step);
+  const char* palette =
+      picture.diverging
+          ? "0 '#2166ac', 1 '#4393c3', 2 '#92c5de', 3 '#d1e5f0', 4 '#f7f7f7', 5 '#fddbc7', 6 '#f4a582', "
+            "7 '#d6604d', 8 '#b2182b'"
+          : "0 '#f9f9f9', 1 '#eae6f1', 2 '#dad2ea', 3 '#cabfe2', 4 '#bbacda', 5 '#ab9ad2', 6 '#9b88ca', "
+            "7 '#8a76c1', 8 '#7a64b9'";
+  return fmt::format("set palette defined ({})\nset cbrange [{:.6g}:{:.6g}]\nset cbtics {:.6g}\n", palette,
+                     picture.diverging ? -end : 0, end, step);
+}
+
+/// Both pairs of axes: normalised coordinates, and metres from the tunnel's centre (4.1, 4.2).
+std::string axes(const MapGeometry& geometry) {
+  const double y_m = (geometry.tunnel_width_m - geometry.vehicle_width_m) / 2;
+  const double z_m = (geometry.tunnel_height_m - geometry.vehicle_height_m) / 2;
+  return fmt::format(
+      "set lmargin at screen 0.135\nset rmargin at screen 0.73\n"
+      "set bmargin at screen 0.125\nset tmargin at screen 0.807\n"
+      "set xrange [-1:1]\nset yrange [-1:1]\n"
+      "set x2range [-{0:.6g}:{0:.6g}]\nset y2range [-{1:.6g}:{1:.6g}]\n"
+      "set xtics -1,0.5,1 nomirror out\nset ytics -1,0.5,1 nomirror out\n"
+      "set x2tics {2:.6g} out offset 0,-0.3\nset y2tics {3:.6g} out offset -0.3,0\n"
+      "set xlabel '← wall              ȳ = 2y / (w_t − w_q)              wall →'\n"
+      "set ylabel '← ground             z̄ = 2z / (h_t − h_q)             ceiling →'\n"
+      "set x2label 'y (m)' offset 0,-0.5\nset y2label 'z (m)' offset -1,0\n"
+      "set colorbox user origin screen 0.86,0.125 size screen 0.028,0.682\n",
+      y_m, z_m, nice_step(y_m / 4), nice_step(z_m / 4));
+}
+
+std::string plot(bool dashed) {
+  std::string command = "plot $field using 1:2:3 with image notitle";
+  if (dashed)
+    command += ", $mirrored with lines linecolor rgb '#303030' linewidth 1.3 dashtype (9,6) notitle";
+  command +=
+      ", $measured with lines linecolor rgb '#101010' linewidth 1.6 notitle"
+      ", $crosses with lines linecolor rgb 'white' linewidth 5 notitle"
+      ", $crosses with lines linecolor rgb '#101010' linewidth 2 notitle"
+      ", $labels using 1:2:3 with labels boxed notitle\n";
+  return command;
+}
+
+}  // namespace
+
+std::string gnuplot_script(const Picture& picture, const std::string& stem) {
+  const auto on_side = [&](double sign) {
+    return std::any_of(picture.locations.begin(), picture.locations.end(),
+                       [&](const TunnelPoint& point) { return sign * point.y_norm > 0; });
+  };
+  std::vector<ContourLine> measured, mirrored;
+  for (const bool right : {false, true}) {
+    std::vector<ContourLine>& half = on_side(right ? 1 : -1) ? measured : mirrored;
+    for (ContourLine& line : lines_of_half(picture.lines, right)) half.push_back(std::move(line));
+  }
+  const auto block = [](const char* name, const std::string& lines) {
+    return fmt::format("${} << END\n{}END\n", name, lines);
+  };
+  std::string script =
+      "reset\nset encoding utf8\nset minussign\nset style textbox opaque noborder margins 0.4,0.4\n";
+  script += block("field", field(picture)) + block("measured", polylines(measured)) +
+            block("mirrored", polylines(mirrored)) + block("crosses", crosses(picture.locations)) +
+            block("labels", labels(place_labels(measured, picture.locations), picture.diverging));
+  script += colours(picture) + axes(picture.geometry);
+  script += fmt::format("set title \"{}\\n{{/*0.8 {}{}}}\"\nset cblabel '{}' offset 1,0\n", picture.title,
+                        picture.note, mirrored.empty() ? "" : "; dashed: mirrored", picture.colour_label);
+  for (const auto& [terminal, font_size] : {std::pair{"svg", 20}, std::pair{"pngcairo", 18}}) {  // look alike
+    script += fmt::format(
+        "set terminal {} size 1100,960 font 'sans-serif,{}'\nset output '{}.{}'\n{}unset output\n", terminal,
+        font_size, stem, std::string(terminal).substr(0, 3), plot(!mirrored.empty()));
+  }
+  return script;
+}
+
+}  // namespace tunnelrig

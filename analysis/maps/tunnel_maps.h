@@ -1,0 +1,58 @@
+// From measured locations to the two fitted fields, and from those to the grid that is written.
+#pragma once
+
+#include "analysis/maps/disturbance_map.h"
+#include "analysis/maps/gaussian_process.h"
+#include "analysis/maps/hyperparameters.h"
+#include "analysis/maps/map_input.h"
+#include "analysis/maps/thin_plate_spline.h"
+
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace tunnelrig {
+
+enum class MapMethod { kGaussianProcess, kThinPlateSpline };
+
+/// "gaussian-process", "thin-plate-spline".
+std::string name_of(MapMethod method);
+
+/// The method of that name; throws InputError naming the two that there are.
+MapMethod map_method(const std::string& name);
+
+struct MapSettings {
+  MapMethod method = MapMethod::kGaussianProcess;
+  double coverage_factor = 1.96;  // U95 over the standard uncertainty
+  HyperparameterPriors priors;    // of the Gaussian process
+};
+
+using FittedField = std::variant<GaussianProcess, ThinPlateSpline>;
+
+struct TunnelMaps {
+  MapInput input;  // checked and merged
+  MapSettings settings;
+  FittedField delta_ct;
+  FittedField uneven_thrust;
+};
+
+/// Throws InputError as merge_locations does. 42 locations take some 0.02 s.
+TunnelMaps fit_maps(const MapInput& input, const MapSettings& settings = {});
+
+/// The field at a point, per cent. Throws InputError outside [−1, 1]².
+FieldEstimate estimate_at(const FittedField& field, const TunnelPoint& point);
+
+/// How well each location is predicted by the others.
+std::vector<LeftOut> leave_one_out(const FittedField& field);
+
+/// A regular grid over [−1, 1]²; `nodes` along each side, odd and at least 3, so that it holds (0, 0).
+/// Throws InputError for another number.
+MapGrid regular_grid(int nodes);
+
+/// The field on a grid, rounded to 10⁻⁶ percentage points; never −0.
+MapLayer sample(const FittedField& field, const MapGrid& grid, double coverage_factor);
+
+/// What disturbance_map.json holds. `provenance` is the text of a JSON object.
+DisturbanceMap disturbance_map(const TunnelMaps& maps, int nodes, const std::string& provenance);
+
+}  // namespace tunnelrig

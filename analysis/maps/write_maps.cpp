@@ -1,0 +1,165 @@
+#include "analysis/maps/write_maps.h"
+
+#include "analysis/maps/contours.h"
+#include "analysis/maps/gnuplot.h"
+#include "analysis/maps/picture.h"
+#include "datasets/csv.h"
+#include "datasets/error.h"
+
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <system_error>
+
+namespace tunnelrig {
+namespace {
+
+// Finer than the grid of the files, so that lines are smooth; it holds a column at ȳ = 0, where pictures
+// change from the measured to the mirrored half.
+constexpr int kDrawingNodes = 121;
+constexpr int kMostLevels = 14, kMostUncertaintyLevels = 5;
+
+constexpr std::array kPictures = {"delta_ct.svg",          "delta_ct.png",         "delta_ct_u95.svg",
+                                  "delta_ct_u95.png",      "uneven_thrust.svg",    "uneven_thrust.png",
+                                  "uneven_thrust_u95.svg", "uneven_thrust_u95.png"};
+
+/// A scratch folder within the target, so that renaming out of it stays on one file system; gone afterwards.
+class Staging {
+ public:
+  explicit Staging(const std::filesystem::path& target) : target_(target) {
+    std::error_code error;
+    std::filesystem::create_directories(target, error);
+    std::string name = (target / ".maps-XXXXXX").string();
+    if (error || ::mkdtemp(name.data()) == nullptr) {
+      throw InputError::in(target.string(), "maps cannot be written here: {}",
+                           error ? error.message() : std::generic_category().message(errno));
+    }
+    path_ = name;
+  }
+  ~Staging() {
+    std::error_code error;
+    std::filesystem::remove_all(path_, error);
+  }
+  Staging(const Staging&) = delete;
+  Staging& operator=(const Staging&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+  /// Renames the files into the target, after a look at what alone could stop that half-way.
+  std::vector<std::filesystem::path> publish(const std::vector<std::string>& names) const {
+    std::vector<std::filesystem::path> files;
+    for (const std::string& name : names) {
+      files.push_back(target_ / name);
+      if (std::filesystem::is_directory(files.back())) {
+        throw InputError::in(files.back().string(), "is a folder where a file of the map is to be written");
+      }
+    }
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      std::error_code error;
+      std::filesystem::rename(path_ / names[i], files[i], error);
+      if (error) throw InputError::in(files[i].string(), "cannot be written: {}", error.message());
+    }
+    return files;
+  }
+
+ private:
+  std::filesystem::path target_, path_;
+};
+
+/// One of the two fields as it is drawn, under the name of its files.
+struct Drawing {
+  std::string name, symbol, title, colour_label;
+  MapLayer layer;  // on the drawing grid
+  std::vector<ContourLine> lines;
+};
+
+std::string layer_csv(const MapGrid& grid, const MapLayer& layer) {
+  std::string text = "y_norm,z_norm,value_percent,u95_percent\n";
+  for (std::size_t row = 0; row < grid.z_norm.size(); ++row) {
+    for (std::size_t column = 0; column < grid.y_norm.size(); ++column) {
+      const std::size_t i = grid.index(row, column);
+      text += fmt::format("{},{},{},{}\n", grid.y_norm[column], grid.z_norm[row], layer.value_percent[i],
+                          layer.u95_percent[i]);
+    }
+  }
+  return text;
+}
+
+std::string contours_csv(const std::vector<ContourLine>& lines) {
+  const auto tidy = [](double coordinate) { return std::round(coordinate * 1e6) / 1e6 + 0.0; };  // without −0
+  std::string text = "level_percent,line,y_norm,z_norm\n";
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    for (const TunnelPoint& point : lines[i].points) {
+      text += fmt::format("{},{},{},{}\n", lines[i].level, i + 1, tidy(point.y_norm), tidy(point.z_norm));
+    }
+  }
+  return text;
+}
+
+/// Two pictures: the field and its uncertainty.
+std::string scripts(const Drawing& drawing, const MapGrid& grid, const TunnelMaps& maps,
+                    const FitSummary& fit) {
+  const bool process = maps.settings.method == MapMethod::kGaussianProcess;
+  Picture picture{
+      .title = drawing.title,
+      .note = fmt::format("{} locations (×), {}, leave-one-out error {:.2f} %", maps.input.locations.size(),
+                          process ? "Gaussian process" : "thin-plate spline", fit.leave_one_out.rms_percent),
+      .colour_label = drawing.colour_label,
+      .diverging = true,
+      .grid = grid,
+      .values = drawing.layer.value_percent,
+      .lines = drawing.lines,
+      .geometry = maps.input.geometry};
+  for (const LocationEstimate& location : maps.input.locations) {
+    picture.locations.push_back({location.y_norm, location.z_norm});
+  }
+  std::string script = gnuplot_script(picture, drawing.name);
+  picture.title = fmt::format("Uncertainty of {}: half width of the 95 % interval", drawing.symbol);
+  picture.colour_label = fmt::format("U_{{95}}({}) (%)", drawing.symbol);
+  picture.diverging = false;
+  picture.values = drawing.layer.u95_percent;
+  picture.lines = contour_plot(grid, picture.values, kMostUncertaintyLevels);
+  return script + gnuplot_script(picture, drawing.name + "_u95");
+}
+
+}  // namespace
+
+WrittenMaps write_maps(const std::filesystem::path& folder, const TunnelMaps& maps,
+                       const WriteSettings& settings) {
+  WrittenMaps written{.map = disturbance_map(maps, settings.nodes, settings.provenance)};
+  const DisturbanceMap& map = written.map;
+  const MapGrid grid = regular_grid(kDrawingNodes);
+  Drawing delta_ct{"delta_ct", "ΔC_T", "Change of thrust coefficient against O_T", "ΔC_T (%)"};
+  Drawing uneven{"uneven_thrust", "U", "Uneven thrust, right pair minus left pair",
+                 "U (%), negative rolls to the right"};
+  delta_ct.layer = sample(maps.delta_ct, grid, map.coverage_factor);
+  uneven.layer = sample(maps.uneven_thrust, grid, map.coverage_factor);
+  for (Drawing* drawing : {&delta_ct, &uneven}) {
+    drawing->lines = contour_plot(grid, drawing->layer.value_percent, kMostLevels);
+  }
+  const std::vector<std::pair<std::string, std::string>> texts = {
+      {"disturbance_map.json", format_disturbance_map(map)},
+      {"delta_ct.csv", layer_csv(map.grid, map.delta_ct)},
+      {"delta_ct_contours.csv", contours_csv(delta_ct.lines)},
+      {"uneven_thrust.csv", layer_csv(map.grid, map.uneven_thrust)},
+      {"uneven_thrust_contours.csv", contours_csv(uneven.lines)}};
+
+  const Staging staging(folder);
+  std::vector<std::string> names;
+  for (const auto& [name, text] : texts) {
+    write_text(staging.path() / name, text);
+    names.push_back(name);
+  }
+  written.warning = run_gnuplot(
+      settings.gnuplot, staging.path(),
+      scripts(delta_ct, grid, maps, map.delta_ct_fit) + scripts(uneven, grid, maps, map.uneven_thrust_fit));
+  if (!written.warning) names.insert(names.end(), kPictures.begin(), kPictures.end());
+  written.files = staging.publish(names);
+  for (const char* picture : kPictures) {
+    if (written.warning) std::filesystem::remove(folder / picture);
+  }
+  return written;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,215 @@
+#include "analysis/reduction.h"
+
+#include "analysis/air.h"
+#include "analysis/conventions.h"
+#include "datasets/error.h"
+#include "datasets/thesis.h"
+
+#include <cmath>
+
+namespace tunnelrig {
+namespace {
+
+constexpr std::array<double, kMaxRotors> kSide = {1, -1, -1,
+                                                  1};  // (5.1): right pair 1, 4 minus left pair 2, 3
+
+Tares tares_of(const CampaignData& data) {
+  std::vector<TareReading> readings;
+  for (const Run& run : data.runs) {
+    const auto statistics = data.statistics.find(run.run);
+    const auto raw = data.raw.find(run.run);
+    if (run.kind != RunKind::kTare || statistics == data.statistics.end() || raw == data.raw.end()) continue;
+    if (raw->second.state != RunState::kComplete) continue;
+    const double half_s = 0.5 * static_cast<double>(raw->second.frames) / data.info.daq.sample_rate_hz;
+    TareReading reading{.session = run.session, .time_s = run.start_s + half_s};
+    for (std::size_t c = 0; c < std::min<std::size_t>(statistics->second.channels.size(), kMaxRotors); ++c) {
+      reading.mean_V[c] = statistics->second.channels[c].mean_V;
+      reading.standard_error_V[c] = statistics->second.channels[c].standard_error_V;
+    }
+    readings.push_back(reading);
+  }
+  return Tares(std::move(readings));
+}
+
+double required(const Run& run, std::string_view column, std::string_view term) {
+  if (const auto value = run.number(column)) return *value;
+  throw InputError::at("runs.csv", run.line,
+                       "run {} has no {}, which the switched-on term {} needs in every run", run.run, column,
+                       term);
+}
+
+/// ρ and Ω of a run by the model; nothing where its temperature was not recorded.
+bool set_conditions(const Run& run, const CampaignInfo& info, const ModelTerms& terms,
+                    RunCoefficients& result) {
+  const auto celsius = run.number("air_temperature_C");
+  if (!celsius) return false;
+  result.temperature_K = *celsius + kZeroCelsius_K;
+  const double pressure_Pa =
+      terms.air_pressure ? required(run, "air_pressure_Pa", "air_pressure") : thesis::kPressure_Pa;
+  result.density_kg_m3 = terms.air_humidity
+                             ? moist_air_density_kg_m3(pressure_Pa, result.temperature_K,
+                                                       required(run, "relative_humidity", "air_humidity"))
+                             : dry_air_density_kg_m3(pressure_Pa, result.temperature_K);
+  result.speed_rpm =
+      terms.rotor_speed ? required(run, "speed_rpm", "rotor_speed") : info.rig.nominal_speed_rpm;
+  return true;
+}
+
+void read_thrusts_from_volts(const CampaignData& data, const Run& run, const RunStatistics& statistics,
+                             const Certificate& certificate, const Tares& tares, RunCoefficients& result,
+                             std::array<double, kMaxRotors>& standard_error_N) {
+  const double frames = static_cast<double>(statistics.frames);
+  result.tare = tares.zero_at(run.session, run.start_s + 0.5 * frames / data.info.daq.sample_rate_hz);
+  for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
+    const auto i = static_cast<std::size_t>(rotor);
+    const ChannelStatistics& channel = statistics.channels[i];
+    const auto zero = result.tare ? std::optional<double>(result.tare->zero_V[i]) : std::nullopt;
+    const ForceReading force = certificate.force(rotor + 1, channel.mean_V, zero);
+    const double k = certificate.propellers.factor(rotor);
+    result.thrust_N[i] = force.force_N / k;
+    result.d_zero_N_per_V[i] = force.d_zero_N_per_V / k;
+    result.d_gain_N2_per_V[i] = force.d_gain_N2_per_V / k;
+    result.d_tare_N_per_V[i] = force.d_tare_N_per_V / k;
+    standard_error_N[i] = std::abs(force.d_voltage_N_per_V) * channel.standard_error_V / k;
+    result.zero_from_calibration |= force.zero_from_calibration;
+    result.extrapolated |= force.extrapolated;
+    result.stationary &= channel.stationary();
+    result.clipped += channel.clipped;
+  }
+}
+
+void set_coefficients(const CampaignInfo& info, const std::array<double, kMaxRotors>& standard_error_N,
+                      RunCoefficients& result) {
+  double uneven_N = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(info.rig.rotors); ++i) {
+    result.total_N += result.thrust_N[i];
+    uneven_N += kSide[i] * result.thrust_N[i];
+  }
+  result.c_t =
+      result.total_N / thesis_reference_thrust_N(result.density_kg_m3, result.speed_rpm, info.rig);  // (4.18)
+  result.u_percent = info.rig.rotors == kMaxRotors ? 100 * uneven_N / result.total_N
+                                                   : std::numeric_limits<double>::quiet_NaN();  // (5.1)
+  const auto c_t_slope = c_t_per_thrust(result, info.rig);
+  const auto u_slope = u_per_thrust(result);
+  double c_t_variance = 0, u_variance = 0;
+  for (std::size_t i = 0; i < standard_error_N.size(); ++i) {
+    c_t_variance += std::pow(c_t_slope[i] * standard_error_N[i], 2);
+    u_variance += std::pow(u_slope[i] * standard_error_N[i], 2);
+  }
+  result.c_t_standard_error = std::sqrt(c_t_variance);
+  result.u_standard_error = std::sqrt(u_variance);
+}
+
+/// Why a run with raw data cannot be reduced; empty where it can.
+std::string why_not(const CampaignData& data, const Run& run, const RawRun& raw) {
+  const auto statistics = data.statistics.find(run.run);
+  if (statistics == data.statistics.end())
+    return "no statistics are stored; `reduce --from-raw` computes them";
+  if (statistics->second.hash != raw.hash)
+    return "its statistics are of other raw data; `reduce --from-raw` computes them anew";
+  for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
+    if (statistics->second.channels[static_cast<std::size_t>(rotor)].stuck()) {
+      return fmt::format("channel {} is stuck: it never changes", rotor + 1);
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string ModelTerms::name() const {
+  std::string name;
+  const auto add = [&name](bool on, std::string_view term) {
+    if (on) name += (name.empty() ? "" : "+") + std::string(term);
+  };
+  add(air_pressure, "air_pressure");
+  add(air_humidity, "air_humidity");
+  add(rotor_speed, "rotor_speed");
+  return name.empty() ? "thesis" : name;
+}
+
+ModelTerms terms_from_names(std::string_view names) {
+  ModelTerms terms;
+  while (!names.empty()) {
+    const auto end = names.find_first_of(",+");
+    const std::string_view name = names.substr(0, end);
+    if (name == "air_pressure")
+      terms.air_pressure = true;
+    else if (name == "air_humidity")
+      terms.air_humidity = true;
+    else if (name == "rotor_speed")
+      terms.rotor_speed = true;
+    else if (name != "thesis")
+      throw InputError(
+          fmt::format("'{}' is no term; write air_pressure, air_humidity, rotor_speed or thesis", name));
+    names = end == std::string_view::npos ? std::string_view() : names.substr(end + 1);
+  }
+  return terms;
+}
+
+std::array<double, kMaxRotors> c_t_per_thrust(const RunCoefficients& run, const Rig& rig) {
+  std::array<double, kMaxRotors> slope{};
+  const double reference_N = thesis_reference_thrust_N(run.density_kg_m3, run.speed_rpm, rig);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(rig.rotors); ++i) slope[i] = 1 / reference_N;
+  return slope;
+}
+
+std::array<double, kMaxRotors> u_per_thrust(const RunCoefficients& run) {
+  std::array<double, kMaxRotors> slope{};
+  if (std::isnan(run.u_percent)) return slope;
+  for (std::size_t i = 0; i < slope.size(); ++i) slope[i] = (100 * kSide[i] - run.u_percent) / run.total_N;
+  return slope;
+}
+
+Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms) {
+  Reduction reduction;
+  reduction.terms = terms;
+  reduction.tares = tares_of(data);
+  for (std::size_t r = 0; r < data.runs.size(); ++r) {
+    const Run& run = data.runs[r];
+    if (run.kind == RunKind::kTare) continue;
+    RunCoefficients result;
+    result.run = r;
+    std::array<double, kMaxRotors> standard_error_N{};
+    if (!set_conditions(run, data.info, terms, result)) {
+      reduction.left_out.push_back({run.run, "air_temperature_C was not recorded, so there is no density"});
+      continue;
+    }
+    if (const auto raw = data.raw.find(run.run); raw != data.raw.end()) {
+      if (raw->second.state != RunState::kComplete) {
+        reduction.left_out.push_back({run.run, "its recording is partial", false});
+        continue;
+      }
+      if (const std::string reason = why_not(data, run, raw->second); !reason.empty()) {
+        reduction.left_out.push_back({run.run, reason});
+        continue;
+      }
+      if (!data.certificate)
+        throw InputError("there is no calibration yet: `tunnelrig calibrate` comes before this");
+      read_thrusts_from_volts(data, run, data.statistics.at(run.run), *data.certificate, reduction.tares,
+                              result, standard_error_N);
+    } else if (run.thrust_N[0]) {
+      for (std::size_t i = 0; i < static_cast<std::size_t>(data.info.rig.rotors); ++i)
+        result.thrust_N[i] = run.thrust_N[i].value_or(0);
+    } else {
+      reduction.left_out.push_back({run.run, "it has no raw data and no thrusts"});
+      continue;
+    }
+    set_coefficients(data.info, standard_error_N, result);
+    if (!(result.total_N > 0)) {
+      reduction.left_out.push_back(
+          {run.run, fmt::format("its total thrust is {:.3g} N: were the motors running?", result.total_N)});
+      continue;
+    }
+    reduction.runs.push_back(result);
+  }
+  if (reduction.runs.empty()) {
+    throw InputError(reduction.left_out.empty()
+                         ? "the campaign holds no thrust run"
+                         : fmt::format("no run can be reduced; run {}: {}", reduction.left_out[0].run,
+                                       reduction.left_out[0].reason));
+  }
+  return reduction;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,72 @@
+// Runs to coefficients: calibrated thrusts, C_T and U of each run, with what they depend on.
+#pragma once
+
+#include "analysis/campaign_data.h"
+#include "calibration/tare.h"
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tunnelrig {
+
+/// Measured conditions that enter the model beyond the thesis's: each only where it is switched on by name.
+struct ModelTerms {
+  bool air_pressure = false;  // ρ at the measured pressure, not at 101325 Pa
+  bool air_humidity = false;  // ρ of moist air
+  bool rotor_speed = false;   // Ω as the tachometer read it, not nominal
+
+  /// "thesis" or the names of the terms, "air_pressure+rotor_speed".
+  std::string name() const;
+};
+
+/// Reads "air_pressure,air_humidity,rotor_speed" in any order, or "thesis"; throws InputError.
+ModelTerms terms_from_names(std::string_view names);
+
+/// One thrust run, reduced.
+struct RunCoefficients {
+  std::size_t run = 0;                        // index in CampaignData::runs
+  std::array<double, kMaxRotors> thrust_N{};  // calibrated, over the propeller's factor
+  double total_N = 0;
+  double c_t = 0;        // (4.18)
+  double u_percent = 0;  // (5.1); NaN for fewer than four rotors
+  double density_kg_m3 = 0;
+  double speed_rpm = 0;
+  double temperature_K = 0;
+  double c_t_standard_error = 0;  // of the run's noise alone
+  double u_standard_error = 0;
+
+  // how each corrected thrust depends on what is shared between runs
+  std::array<double, kMaxRotors> d_zero_N_per_V{}, d_gain_N2_per_V{}, d_tare_N_per_V{};
+  std::optional<TareZero> tare;
+
+  bool zero_from_calibration = false;
+  bool extrapolated = false;
+  bool stationary = true;
+  std::uint64_t clipped = 0;  // samples
+};
+
+struct LeftOutRun {
+  std::string run, reason;
+  bool problem = true;  // false: nothing that needs mending (a partial recording)
+};
+
+struct Reduction {
+  ModelTerms terms;
+  std::vector<RunCoefficients> runs;
+  std::vector<LeftOutRun> left_out;
+  Tares tares{{}};
+};
+
+/// Reduces every thrust run that can be; the others are left out by name. Throws InputError where no run can
+/// be, where raw runs have no calibration, and where a switched-on term lacks its measurement in some run.
+Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms);
+
+/// ∂C_T/∂T_i and ∂U/∂T_i of a run.
+std::array<double, kMaxRotors> c_t_per_thrust(const RunCoefficients& run, const Rig& rig);
+std::array<double, kMaxRotors> u_per_thrust(const RunCoefficients& run);
+
+}  // namespace tunnelrig

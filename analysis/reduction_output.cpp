@@ -1,0 +1,150 @@
+#include "analysis/reduction_output.h"
+
+#include "datasets/error.h"
+
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A number for a cell: what is not known is left empty.
+std::string cell(double value, const char* format = "{:.8g}") {
+  return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : std::string();
+}
+
+std::string cell(std::optional<double> value) { return value ? fmt::format("{}", *value) : std::string(); }
+
+Json maybe(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+struct BudgetPart {
+  const char* name;
+  double Budget::*value;
+};
+constexpr BudgetPart kBudget[] = {{"run", &Budget::run},
+                                  {"visit", &Budget::visit},
+                                  {"session", &Budget::session},
+                                  {"calibration", &Budget::calibration},
+                                  {"propellers", &Budget::propellers},
+                                  {"tare", &Budget::tare},
+                                  {"speed", &Budget::speed},
+                                  {"temperature", &Budget::temperature},
+                                  {"pressure", &Budget::pressure}};
+
+Json value_json(const LocationValue& value, double factor) {
+  return {{"mean", factor * value.mean},
+          {"std", maybe(factor * value.std)},
+          {"standard_uncertainty", factor * value.standard_uncertainty},
+          {"dof", maybe(value.dof)},
+          {"u95", factor * value.u95}};
+}
+
+Json location_json(const LocationSummary& location, double factor, bool has_u) {
+  Json json{{"location", location.label}, {"runs", location.runs}, {"sessions", location.sessions}};
+  if (location.y_norm) json["y_norm"] = *location.y_norm;
+  if (location.z_norm) json["z_norm"] = *location.z_norm;
+  json["thrust_N"] = location.thrust_N;
+  json["c_t"] = value_json(location.c_t, factor);
+  if (has_u) json["u_percent"] = value_json(location.u_percent, 1);
+  for (const BudgetPart& part : kBudget)
+    json["c_t_budget"][part.name] = factor * (location.budget.*part.value);
+  for (const double value : location.c_rotor) json["c_rotor"].push_back(factor * value);
+  return json;
+}
+
+}  // namespace
+
+std::string locations_csv(const Summary& summary, const Rig& rig, Convention convention) {
+  const double factor = convert_coefficient(1, Convention::kThesis, convention, rig);
+  const bool has_u = rig.rotors == kMaxRotors;
+  std::string csv =
+      "location,y_norm,z_norm,runs,c_t,c_t_std,c_t_u95,u_percent,u_percent_std,u_percent_u95,sessions,thrust_"
+      "N";
+  for (int rotor = 1; rotor <= rig.rotors; ++rotor) csv += fmt::format(",c_rotor_{}", rotor);
+  csv += ",c_t_dof";
+  for (const BudgetPart& part : kBudget) csv += fmt::format(",c_t_u_{}", part.name);
+  csv += ",convention\n";
+  for (const LocationSummary& location : summary.locations) {
+    const auto u_cell = [&](double value) { return has_u ? cell(value, "{:.6f}") : std::string(); };
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", location.label, cell(location.y_norm),
+                       cell(location.z_norm), location.runs, cell(factor * location.c_t.mean),
+                       cell(factor * location.c_t.std), cell(factor * location.c_t.u95),
+                       u_cell(location.u_percent.mean), u_cell(location.u_percent.std),
+                       u_cell(location.u_percent.u95), location.sessions, cell(location.thrust_N));
+    for (const double value : location.c_rotor) csv += "," + cell(factor * value);
+    csv += "," + cell(location.c_t.dof, "{:.1f}");
+    for (const BudgetPart& part : kBudget)
+      csv += "," + cell(factor * (location.budget.*part.value), "{:.4g}");
+    csv += fmt::format(",{}\n", name_of(convention));
+  }
+  return csv;
+}
+
+std::string runs_csv(const CampaignData& data, const Reduction& reduction, Convention convention) {
+  const double factor = convert_coefficient(1, Convention::kThesis, convention, data.info.rig);
+  std::string csv = "run,location,repeat,session,start_utc,c_t,u_percent,density_kg_m3,speed_rpm";
+  for (int rotor = 1; rotor <= data.info.rig.rotors; ++rotor) csv += fmt::format(",thrust_{}_N", rotor);
+  csv += ",c_t_standard_error,stationary,clipped,zero_from_calibration,convention\n";
+  for (const RunCoefficients& reduced : reduction.runs) {
+    const Run& run = data.runs[reduced.run];
+    csv += fmt::format("{},{},{},{},{},{},{},{:.6f},{:.1f}", run.run, run.location, run.repeat, run.session,
+                       format_utc(run.start_s), cell(factor * reduced.c_t), cell(reduced.u_percent, "{:.6f}"),
+                       reduced.density_kg_m3, reduced.speed_rpm);
+    for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
+      csv += fmt::format(",{:.6f}", reduced.thrust_N[static_cast<std::size_t>(rotor)]);
+    }
+    csv += fmt::format(",{},{},{},{},{}\n", cell(factor * reduced.c_t_standard_error, "{:.4g}"),
+                       reduced.stationary ? 1 : 0, reduced.clipped, reduced.zero_from_calibration ? 1 : 0,
+                       name_of(convention));
+  }
+  return csv;
+}
+
+std::string reduction_json(const CampaignData& data, const Reduction& reduction, const Summary& summary,
+                           Convention convention) {
+  const double factor = convert_coefficient(1, Convention::kThesis, convention, data.info.rig);
+  Json json{{"format", "tunnelrig-reduction/1"},  {"campaign", data.info.name},
+            {"model", reduction.terms.name()},    {"convention", name_of(convention)},
+            {"calibration", data.certificate_id}, {"runs", reduction.runs.size()}};
+  json["locations"] = Json::array();
+  for (const LocationSummary& location : summary.locations) {
+    json["locations"].push_back(location_json(location, factor, data.info.rig.rotors == kMaxRotors));
+  }
+  json["left_out"] = Json::array();
+  for (const LeftOutRun& run : reduction.left_out) {
+    json["left_out"].push_back({{"run", run.run}, {"reason", run.reason}, {"problem", run.problem}});
+  }
+  json["notes"] = summary.notes;
+  return json.dump(1);
+}
+
+MapInput map_input(const CampaignData& data, const Summary& summary, const std::string& source) {
+  if (!data.info.tunnel)
+    throw InputError::in(source, "campaign.toml has no [tunnel], so there is nothing to map");
+  if (data.info.rig.rotors != kMaxRotors)
+    throw InputError::in(source, "a map of U needs four rotors; this rig has {}", data.info.rig.rotors);
+  MapInput input;
+  input.source = source;
+  input.geometry = {.vehicle_width_m = data.info.rig.vehicle_width_m,
+                    .vehicle_height_m = data.info.rig.vehicle_height_m,
+                    .tunnel_width_m = data.info.tunnel->width_m,
+                    .tunnel_height_m = data.info.tunnel->height_m,
+                    .propeller_radius_m = data.info.rig.propeller_radius_m};
+  std::vector<Eigen::Index> rows;
+  for (std::size_t l = 0; l < summary.locations.size(); ++l) {
+    const LocationSummary& location = summary.locations[l];
+    if (location.label == "OS") input.c_t_open_space = location.c_t.mean;
+    if (!location.y_norm || !location.z_norm) continue;
+    input.locations.push_back(
+        {location.label, *location.y_norm, *location.z_norm, location.c_t.mean, location.u_percent.mean});
+    rows.push_back(static_cast<Eigen::Index>(l));
+  }
+  input.c_t_covariance = summary.c_t_covariance(rows, rows);
+  input.u_covariance = summary.u_covariance(rows, rows);
+  return input;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,12 @@
+# npm ci in the build tree: NPM is the program, FROM the folder of the lock file, TO where node_modules goes, RESULT the file
+# that is wanted of it. Silent unless it fails.
+foreach(file package.json package-lock.json)
+  configure_file(${FROM}/${file} ${TO}/${file} COPYONLY)
+endforeach()
+execute_process(
+  COMMAND ${NPM} ci --ignore-scripts --prefer-offline --no-audit --no-fund
+  WORKING_DIRECTORY ${TO} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "Plotly could not be fetched; the network is needed once, at the first build. npm ci said:\n${output}")
+endif()
+file(TOUCH ${RESULT})  # packages carry old dates, and the file must be newer than the lock

@@ -1,0 +1,27 @@
+#include "analysis/report/page_parts.h"
+
+#include <cstdint>
+
+// The assembler takes the files in: a compiler would need minutes and gigabytes for Plotly as an array.
+// TUNNELRIG_…_FILE are paths, which CMakeLists.txt defines.
+#define TUNNELRIG_EMBED(name, file)                                                                         \
+  asm(".pushsection .rodata\n"                                                                              \
+      ".balign 8\n" #name "_size: .quad " #name "_end - " #name "\n" #name ": .incbin \"" file "\"\n" #name \
+      "_end:\n"                                                                                             \
+      ".popsection\n");                                                                                     \
+  extern "C" const std::uint64_t name##_size;                                                               \
+  extern "C" const char name[];
+
+TUNNELRIG_EMBED(tunnelrig_page_template, TUNNELRIG_TEMPLATE_FILE)
+TUNNELRIG_EMBED(tunnelrig_page_style, TUNNELRIG_STYLE_FILE)
+TUNNELRIG_EMBED(tunnelrig_page_script, TUNNELRIG_SCRIPT_FILE)
+TUNNELRIG_EMBED(tunnelrig_plotly, TUNNELRIG_PLOTLY_FILE)
+
+namespace tunnelrig::report {
+
+std::string_view page_template() { return {tunnelrig_page_template, tunnelrig_page_template_size}; }
+std::string_view page_style() { return {tunnelrig_page_style, tunnelrig_page_style_size}; }
+std::string_view page_script() { return {tunnelrig_page_script, tunnelrig_page_script_size}; }
+std::string_view plotly() { return {tunnelrig_plotly, tunnelrig_plotly_size}; }
+
+}  // namespace tunnelrig::report

@@ -1,0 +1,120 @@
+#include "analysis/report/report_data.h"
+
+#include "analysis/maps/tunnel_maps.h"
+#include "analysis/reduction_output.h"
+#include "analysis/report/sections.h"
+#include "datasets/error.h"
+
+#include <utility>
+
+namespace tunnelrig {
+namespace {
+
+using report::Json;
+using report::Material;
+
+// Finer than the grid of `map`, so that the page's lines are smooth; with a column at ȳ = 0, where it changes
+// from the measured to the mirrored half.
+constexpr int kNodes = 61;
+
+report::Frames frames_of(const CampaignFile& file, const RawRun& run) {
+  if (const auto ledger = ledger_of(file, run.id)) return {ledger->frames_emitted, ledger->frames_lost};
+  report::Frames frames{.emitted = run.frames};
+  for (const Gap& gap : gaps_of(file, run.id)) frames.lost += gap.frames_lost;
+  frames.emitted += frames.lost;
+  return frames;
+}
+
+/// Reduces and maps as far as the campaign allows, and keeps the reason where it does not.
+void derive(Material& material) {
+  try {
+    material.reduction = reduce_runs(material.data, material.settings.terms);
+    material.summary = summarize_locations(material.data, *material.reduction);
+  } catch (const InputError& error) {
+    material.reduction.reset();
+    material.not_reduced = error.what();
+    material.not_mapped = error.what();
+    return;
+  }
+  try {
+    const TunnelMaps maps = fit_maps(map_input(material.data, *material.summary, material.settings.db));
+    material.map = disturbance_map(maps, kNodes, "{}");
+  } catch (const InputError& error) {
+    material.not_mapped = error.what();
+  }
+}
+
+Material gather(const CampaignFile& file, const ReportSettings& settings,
+                const std::function<void(std::size_t, std::size_t)>& progress) {
+  Material material{.file = file, .settings = settings, .data = read_campaign_data(file)};
+  if (material.data.runs.empty() && !material.data.certificate) {
+    throw InputError::in(settings.db, "holds no runs and no calibration yet, so there is nothing to report");
+  }
+  derive(material);
+  for (const Run& run : material.data.runs) {
+    const auto raw = material.data.raw.find(run.run);
+    material.frames.push_back(raw == material.data.raw.end() ? report::Frames{}
+                                                             : frames_of(file, raw->second));
+  }
+  material.findings = examine(file, material.data, progress);
+  return material;
+}
+
+Json campaign_document(const Material& material) {
+  return {{"kind", "campaign"},
+          {"name", material.data.info.name},
+          {"rotors", material.data.info.rig.rotors},
+          {"nominal_speed_rpm", material.data.info.rig.nominal_speed_rpm},
+          {"summary", report::summary_section(material)},
+          {"runs", report::runs_section(material)},
+          {"sections",
+           {{"maps", report::maps_section(material)},
+            {"locations", report::locations_section(material)},
+            {"open_space", report::open_space_section(material)},
+            {"uneven", report::uneven_section(material)},
+            {"budget", report::budget_section(material)},
+            {"calibration", report::calibration_section(material)},
+            {"health", report::health_section(material)},
+            {"tares", report::tares_section(material)},
+            {"findings", report::findings_section(material)},
+            {"provenance", report::documents_section(material.file)}}}};
+}
+
+Json table_document(const CampaignFile& file) {
+  const ObservationTable table = observations_of(file);
+  Json coefficients;
+  try {
+    coefficients = report::table_section(table, reduce_table_rows(table, Convention::kPropeller));
+  } catch (const InputError& error) {
+    coefficients = report::absent(fmt::format("There is no C_T to show: {}.", error.what()));
+  }
+  return {{"kind", "table"},
+          {"name", table.schema.name},
+          {"observations", table.rows.size()},
+          {"sections", {{"table", coefficients}, {"provenance", report::documents_section(file)}}}};
+}
+
+}  // namespace
+
+ReportData report_data(const CampaignFile& file, const ReportSettings& settings,
+                       const std::function<void(std::size_t, std::size_t)>& progress) {
+  if (file.empty())
+    throw InputError::in(settings.db, "holds neither a campaign nor a table, so there is nothing to report");
+  Json document{{"format", "tunnelrig-report/1"},
+                {"made",
+                 {{"program", "tunnelrig " + settings.program_version},
+                  {"arguments", settings.arguments},
+                  {"created_utc", settings.created_utc},
+                  {"db", settings.db},
+                  {"model", settings.terms.name()}}}};
+  document.update(file.text("table.toml") ? table_document(file)
+                                          : campaign_document(gather(file, settings, progress)));
+  ReportData data;
+  for (const auto& [name, section] : document["sections"].items()) {
+    if (section.contains("absent")) data.absent.push_back({name, section["absent"].get<std::string>()});
+  }
+  data.json = document.dump(-1, ' ', false, Json::error_handler_t::replace);  // paths need not be UTF-8
+  return data;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,181 @@
+#include "calibration/certificate.h"
+#include "calibration/crosstalk.h"
+#include "cli/console.h"
+#include "cli/verb.h"
+#include "datasets/campaign_file.h"
+#include "datasets/error.h"
+
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig::cli {
+namespace {
+
+struct Options {
+  std::string db, points, propellers, loss = "ordinary", matrix, force_unit = "N", zeros = "block";
+  std::vector<std::string> forces, readings;
+  bool diagonal = false, keep_gross = false, json = false;
+};
+
+RobustLoss loss_of(const std::string& name) {
+  if (name == "huber") return RobustLoss::kHuber;
+  if (name == "cauchy") return RobustLoss::kCauchy;
+  if (name == "tukey") return RobustLoss::kTukey;
+  return RobustLoss::kOrdinary;
+}
+
+/// Puts a laboratory's own file of points or tests into the campaign, once it is known to be good.
+template <typename Parse>
+void take_sheet(CampaignFile& file, const std::string& path, const char* name, Parse parse) {
+  if (path.empty()) return;
+  const Sheet sheet = read_csv(path);
+  parse(sheet);
+  file.set_sheet(name, sheet);
+}
+
+int calibrate_campaign(const Options& options) {
+  CampaignFile file(options.db, CampaignFile::Access::kWrite);
+  const CampaignInfo info = file.info();
+  CalibrationOptions how{.rotors = info.rig.rotors};
+  how.cell.loss = loss_of(options.loss);
+  how.cell.gauge_force_N = info.uncertainty.force_N.value_or(0);
+  how.cell.leave_out_gross = !options.keep_gross;
+  Certificate certificate;
+  std::int64_t id = 0;
+  file.atomically([&] {
+    take_sheet(file, options.points, "calibration",
+               [&](const Sheet& sheet) { parse_calibration(sheet, info.rig.rotors); });
+    take_sheet(file, options.propellers, "propellers",
+               [&](const Sheet& sheet) { parse_propellers(sheet, info.rig.rotors); });
+    const auto points = file.calibration_points();
+    if (points.empty())
+      throw InputError::in(options.db, "holds no calibration points; --points calibration.csv adds them");
+    certificate = calibrate(points, file.propeller_tests(), how);
+    const nlohmann::json inputs{{"points", certificate.points_hash}};
+    id = file.add_document("calibration", {program_version(), arguments(), inputs.dump()},
+                           to_json(certificate));
+  });
+  if (options.json) {
+    fmt::print("{}\n", to_json(certificate, 1));
+  } else {
+    fmt::print("{}\nstored in {} as calibration {}\n", format_certificate(certificate), options.db, id);
+  }
+  return certificate.passed() ? kWell : kProblemFound;
+}
+
+nlohmann::ordered_json matrix_json(const Eigen::MatrixXd& matrix) {
+  auto rows = nlohmann::ordered_json::array();
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
+    rows.push_back(std::vector<double>(matrix.row(r).begin(), matrix.row(r).end()));
+  }
+  return rows;
+}
+
+nlohmann::ordered_json crosstalk_json(const CrosstalkFit& fit) {
+  nlohmann::ordered_json json{{"axes", fit.axes},
+                              {"channels", fit.channels},
+                              {"matrix_per_N", matrix_json(fit.matrix)},
+                              {"even_per_N", matrix_json(fit.even)},
+                              {"rows_used", fit.rows_used},
+                              {"dof", fit.dof}};
+  json["suspicious"] = nlohmann::ordered_json::array();
+  for (const CrosstalkRow& row : fit.suspicious) {
+    json["suspicious"].push_back({{"line", row.line},
+                                  {"channel", row.channel},
+                                  {"residual_N", row.residual_N},
+                                  {"studentised", row.studentised},
+                                  {"p", row.p},
+                                  {"gross", row.gross},
+                                  {"left_out", row.left_out}});
+  }
+  return json;
+}
+
+void print_crosstalk(const CrosstalkFit& fit, const std::string& file) {
+  fmt::print("{}: {} rows, {} degrees of freedom. Readings per newton of load on each axis:\n\n", file,
+             fit.rows_used, fit.dof);
+  std::vector<std::string> headers = {"channel"};
+  headers.insert(headers.end(), fit.axes.begin(), fit.axes.end());
+  const bool both_signs = !fit.even.isZero();
+  for (const std::string& axis : fit.axes) {
+    if (both_signs) headers.push_back("even " + axis);
+  }
+  Table table(headers);
+  for (Eigen::Index r = 0; r < fit.matrix.rows(); ++r) {
+    std::vector<std::string> cells = {fit.channels[static_cast<std::size_t>(r)]};
+    for (Eigen::Index c = 0; c < fit.matrix.cols(); ++c)
+      cells.push_back(fmt::format("{:.6g}", fit.matrix(r, c)));
+    for (Eigen::Index c = 0; both_signs && c < fit.even.cols(); ++c)
+      cells.push_back(fmt::format("{:.6g}", fit.even(r, c)));
+    table.add(cells);
+  }
+  table.print();
+  for (const CrosstalkRow& row : fit.suspicious) {
+    warn(fmt::format("{}:{}: {} is {:.3f} N off (studentised {:.1f}, p {:.2g}){}", file, row.line,
+                     row.channel, row.residual_N, row.studentised, row.p,
+                     row.left_out ? "; left out of the fit" : ""));
+  }
+}
+
+int calibrate_matrix(const Options& options) {
+  if (options.forces.empty() || options.forces.size() != options.readings.size()) {
+    throw InputError("--matrix: --forces and --readings name the columns of as many axes as channels");
+  }
+  const CrosstalkSpec spec{
+      .force_columns = options.forces, .reading_columns = options.readings, .force_unit = options.force_unit};
+  const CrosstalkFit fit =
+      fit_crosstalk(read_crosstalk(read_csv(options.matrix), spec),
+                    {.zeros = options.zeros == "common" ? BlockZero::kCommon : BlockZero::kPerBlock,
+                     .shape = options.diagonal ? MatrixShape::kDiagonal : MatrixShape::kFull,
+                     .leave_out_gross = !options.keep_gross});
+  if (options.json) {
+    fmt::print("{}\n", crosstalk_json(fit).dump(1));
+  } else {
+    print_crosstalk(fit, options.matrix);
+  }
+  return fit.suspicious.empty() ? kWell : kProblemFound;
+}
+
+int run(const Options& options) {
+  if (!options.matrix.empty()) return calibrate_matrix(options);
+  if (options.db.empty()) throw InputError("calibrate: --db FILE is required (or --matrix CSV)");
+  return calibrate_campaign(options);
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app, Work& work) {
+  auto options = std::make_shared<Options>();
+  CLI::App* verb =
+      app.add_subcommand("calibrate", "Fit load cells and propellers; print and store the certificate");
+  verb->footer(
+      "Exit code 1: the certificate has gates that were not passed, or rows that do not fit the others.\n\n"
+      "Examples: tunnelrig calibrate --db my.db\n"
+      "          tunnelrig calibrate --db my.db --points calibration.csv --propellers propellers.csv\n"
+      "          tunnelrig calibrate --matrix cell3.csv --forces force_x,force_y,force_z --readings "
+      "sensor_x,sensor_y,sensor_z --force-unit gf");
+  verb->add_option("--db", options->db, "Campaign file");
+  verb->add_option("--points", options->points, "CSV of calibration points, in place of those in the file");
+  verb->add_option("--propellers", options->propellers,
+                   "CSV of propeller tests, in place of those in the file");
+  verb->add_option("--loss", options->loss, "How much a point far from the line counts")
+      ->check(CLI::IsMember({"ordinary", "huber", "cauchy", "tukey"}))
+      ->capture_default_str();
+  verb->add_flag("--keep-gross", options->keep_gross, "Do not leave gross errors out of the fit");
+  verb->add_option("--matrix", options->matrix,
+                   "CSV of loads on several axes: fit the crosstalk matrix, nothing else");
+  verb->add_option("--forces", options->forces, "Its force columns")->delimiter(',');
+  verb->add_option("--readings", options->readings, "Its reading columns, in the same order")->delimiter(',');
+  verb->add_option("--force-unit", options->force_unit, "Unit of the forces")->capture_default_str();
+  verb->add_option("--zeros", options->zeros,
+                   "block: a row without load starts a block with its own zero; common: one zero")
+      ->check(CLI::IsMember({"block", "common"}))
+      ->capture_default_str();
+  verb->add_flag("--diagonal", options->diagonal, "One gain per axis, no crosstalk");
+  verb->add_flag("--json", options->json, "Print as JSON");
+  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+}
+
+}  // namespace tunnelrig::cli

@@ -1,0 +1,112 @@
+#include "analysis/run_summary.h"
+#include "cli/console.h"
+#include "cli/verb.h"
+#include "datasets/campaign_folder.h"
+#include "datasets/error.h"
+#include "datasets/observations.h"
+#include "datasets/rcbenchmark.h"
+
+#include <chrono>
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig::cli {
+namespace {
+
+struct Options {
+  std::string source, db, format = "folder", schema, sweeps;
+  bool replace = false, allow_stuck = false, json = false;
+  std::optional<double> propeller_diameter_m;
+  std::optional<int> pole_count;
+};
+
+int import_folder(const Options& options) {
+  ProgressBar bar("import");
+  ImportOptions how{.replace = options.replace,
+                    .allow_stuck = options.allow_stuck,
+                    .summarizer = [](const CampaignInfo& info,
+                                     const RawFormat& format) { return make_run_summarizer(info, format); },
+                    .progress =
+                        [&bar](std::size_t done, std::size_t total) {
+                          bar.show(static_cast<double>(done), static_cast<double>(total),
+                                   fmt::format("run {} of {}", done, total));
+                        }};
+  const auto start = std::chrono::steady_clock::now();
+  const ImportSummary summary = import_campaign_folder(options.source, options.db, how);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (options.json) {
+    fmt::print("{}\n", nlohmann::json{{"db", options.db},
+                                      {"runs", summary.runs},
+                                      {"raw_runs", summary.raw_runs},
+                                      {"frames", summary.frames},
+                                      {"raw_bytes", summary.raw_bytes},
+                                      {"seconds", seconds}}
+                           .dump(1));
+  } else {
+    fmt::print("{}: {} runs, {} with raw data, {} frames, {:.1f} MB at {:.0f} MB/s\n", options.db,
+               summary.runs, summary.raw_runs, summary.frames, 1e-6 * static_cast<double>(summary.raw_bytes),
+               1e-6 * static_cast<double>(summary.raw_bytes) / seconds);
+  }
+  return kWell;
+}
+
+int import_rows(const Options& options) {
+  std::size_t rows = 0;
+  if (options.format == "table") {
+    if (options.schema.empty())
+      throw InputError("--format table: --schema S.toml is required; it says what the columns are");
+    rows = import_table(options.source, options.schema, options.db, options.replace);
+  } else {
+    rows = import_rcbenchmark(options.source, options.db,
+                              {.replace = options.replace,
+                               .propeller_diameter_m = options.propeller_diameter_m,
+                               .pole_count = options.pole_count,
+                               .sweeps_csv = options.sweeps,
+                               .schema = options.schema});
+  }
+  if (options.json) {
+    fmt::print("{}\n", nlohmann::json{{"db", options.db}, {"observations", rows}}.dump(1));
+  } else {
+    fmt::print("{}: {} observations\n", options.db, rows);
+  }
+  return kWell;
+}
+
+int run(const Options& options) {
+  return options.format == "folder" ? import_folder(options) : import_rows(options);
+}
+
+}  // namespace
+
+void add_import(CLI::App& app, Work& work) {
+  auto options = std::make_shared<Options>();
+  CLI::App* verb =
+      app.add_subcommand("import", "Read a campaign folder, sweeps or a table into a campaign file");
+  verb->footer(
+      "The file appears whole or not at all. docs/campaign-folder.md and docs/tables.md describe what is "
+      "read.\n\n"
+      "Examples: tunnelrig import my_campaign --db my.db\n"
+      "          tunnelrig import sweeps/ --format rcbenchmark --propeller-diameter-m 0.127 --db sweeps.db\n"
+      "          tunnelrig import static.csv --format table --schema static.toml --db static.db");
+  verb->add_option("source", options->source, "Campaign folder; CSV file or folder of sweeps; CSV table")
+      ->required();
+  verb->add_option("--db", options->db, "Campaign file to make")->required();
+  verb->add_option("--format", options->format, "What the source is")
+      ->check(CLI::IsMember({"folder", "rcbenchmark", "table"}))
+      ->capture_default_str();
+  verb->add_flag("--replace", options->replace, "Discard the campaign that the file holds");
+  verb->add_flag("--allow-stuck", options->allow_stuck, "Take runs with a channel that never changes");
+  verb->add_option("--schema", options->schema, "What a table's columns mean (docs/tables.md)");
+  verb->add_option("--sweeps", options->sweeps,
+                   "CSV of what is known of each sweep: file, group, propeller_diameter_m, …");
+  verb->add_option("--propeller-diameter-m", options->propeller_diameter_m, "Of all sweeps");
+  verb->add_option("--pole-count", options->pole_count,
+                   "Of the motor, where the speed column counts electrical revolutions");
+  verb->add_flag("--json", options->json, "Print the summary as JSON");
+  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+}
+
+}  // namespace tunnelrig::cli

@@ -1,0 +1,104 @@
+#include "analysis/maps/write_maps.h"
+#include "analysis/reduction_output.h"
+#include "cli/console.h"
+#include "cli/verb.h"
+#include "datasets/error.h"
+
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig::cli {
+namespace {
+
+struct Options {
+  std::string db, out, method = "gaussian-process", terms = "thesis";
+  int nodes = 41;
+  bool json = false;
+};
+
+nlohmann::ordered_json fit_json(const FitSummary& fit) {
+  nlohmann::ordered_json json{{"leave_one_out_rms_percent", fit.leave_one_out.rms_percent},
+                              {"hyperparameters", fit.hyperparameters}};
+  if (fit.leave_one_out.standardised_rms)
+    json["leave_one_out_standardised"] = *fit.leave_one_out.standardised_rms;
+  return json;
+}
+
+void print(const WrittenMaps& written) {
+  Table table(
+      {"map", "lowest [%]", "highest [%]", "median U95 [%]", "leave-one-out rms [%]", "standardised"});
+  const auto row = [&](const char* name, const MapLayer& layer, const FitSummary& fit) {
+    std::vector<double> u95 = layer.u95_percent;
+    std::nth_element(u95.begin(), u95.begin() + static_cast<std::ptrdiff_t>(u95.size() / 2), u95.end());
+    const auto [low, high] = std::minmax_element(layer.value_percent.begin(), layer.value_percent.end());
+    const auto& standardised = fit.leave_one_out.standardised_rms;
+    table.add({name, fmt::format("{:.2f}", *low), fmt::format("{:.2f}", *high),
+               fmt::format("{:.3f}", u95[u95.size() / 2]),
+               fmt::format("{:.3f}", fit.leave_one_out.rms_percent),
+               standardised ? fmt::format("{:.2f}", *standardised) : "-"});
+  };
+  row("change of C_T against OT", written.map.delta_ct, written.map.delta_ct_fit);
+  row("uneven thrust U", written.map.uneven_thrust, written.map.uneven_thrust_fit);
+  table.print();
+  fmt::print("\n{} locations, {}; {} files in {}\n", written.map.locations.size(), written.map.method,
+             written.files.size(), written.files.empty() ? "" : written.files[0].parent_path().string());
+}
+
+int run(const Options& options) {
+  const CampaignFile file(options.db, CampaignFile::Access::kRead);
+  const CampaignData data = read_campaign_data(file);
+  const Reduction reduction = reduce_runs(data, terms_from_names(options.terms));
+  const Summary summary = summarize_locations(data, reduction);
+  const TunnelMaps maps =
+      fit_maps(map_input(data, summary, options.db), {.method = map_method(options.method)});
+  const nlohmann::json provenance{{"program", "tunnelrig " + program_version()},
+                                  {"arguments", arguments()},
+                                  {"campaign", data.info.name},
+                                  {"calibration", data.certificate_id},
+                                  {"model", reduction.terms.name()},
+                                  {"runs", reduction.runs.size()}};
+  const WrittenMaps written =
+      write_maps(options.out, maps, {.nodes = options.nodes, .provenance = provenance.dump()});
+  CampaignFile(options.db, CampaignFile::Access::kWrite)
+      .add_document(
+          "map",
+          {program_version(), arguments(), nlohmann::json{{"calibration", data.certificate_id}}.dump()},
+          format_disturbance_map(written.map));
+  if (written.warning) warn(*written.warning);
+  if (options.json) {
+    nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},
+                                {"method", written.map.method},
+                                {"locations", written.map.locations.size()},
+                                {"delta_ct", fit_json(written.map.delta_ct_fit)},
+                                {"uneven_thrust", fit_json(written.map.uneven_thrust_fit)}};
+    for (const auto& path : written.files) json["files"].push_back(path.string());
+    fmt::print("{}\n", json.dump(1));
+  } else {
+    print(written);
+  }
+  return kWell;
+}
+
+}  // namespace
+
+void add_map(CLI::App& app, Work& work) {
+  auto options = std::make_shared<Options>();
+  CLI::App* verb =
+      app.add_subcommand("map", "Disturbance maps: change of C_T against OT, and uneven thrust U");
+  verb->footer(
+      "Writes grids (CSV), contour lines, pictures (SVG, PNG) and disturbance_map.json; docs/maps.md.\n\n"
+      "Example: tunnelrig map --db my.db --out maps");
+  verb->add_option("--db", options->db, "Campaign file")->required();
+  verb->add_option("--out", options->out, "Folder for the files")->required();
+  verb->add_option("--method", options->method, "gaussian-process or thin-plate-spline")
+      ->capture_default_str();
+  verb->add_option("--nodes", options->nodes, "Of the grid along each side, odd")->capture_default_str();
+  verb->add_option("--with", options->terms, "Measured conditions that enter the model, as in reduce")
+      ->capture_default_str();
+  verb->add_flag("--json", options->json, "Print the summary as JSON");
+  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+}
+
+}  // namespace tunnelrig::cli

@@ -1,0 +1,193 @@
+#include "analysis/reduction_output.h"
+#include "analysis/table_reduction.h"
+#include "cli/console.h"
+#include "cli/verb.h"
+#include "datasets/error.h"
+#include "datasets/statistics_store.h"
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig::cli {
+namespace {
+
+struct Options {
+  std::string db, csv, runs_csv, plot, convention, terms = "thesis";
+  bool from_raw = false, no_spectra = false, json = false;
+};
+
+std::string inputs_json(const CampaignData& data) {
+  return nlohmann::json{{"calibration", data.certificate_id},
+                        {"points", data.certificate ? data.certificate->points_hash : ""}}
+      .dump();
+}
+
+/// Recomputes what is stored of the raw data and says where the two differ; afterwards the new values count.
+/// True where all agreed.
+bool refresh_from_raw(const Options& options, CampaignData& data) {
+  ProgressBar bar("from raw");
+  const auto computed =
+      statistics_from_raw(options.db, !options.no_spectra, [&bar](std::size_t done, std::size_t total) {
+        bar.show(static_cast<double>(done), static_cast<double>(total),
+                 fmt::format("run {} of {}", done, total));
+      });
+  const auto lines = disagreements(data.statistics, computed);
+  for (const std::string& line : lines) warn(line);
+  if (!options.no_spectra && !lines.empty()) {
+    CampaignFile file(options.db, CampaignFile::Access::kWrite);
+    file.atomically([&] {
+      for (const auto& [run, statistics] : computed) store_statistics(file, data.raw.at(run).id, statistics);
+    });
+    fmt::print(stderr, "{}: the statistics of {} runs were stored anew\n", options.db, computed.size());
+  }
+  for (const auto& [run, statistics] : computed) data.statistics[run] = statistics;
+  return lines.empty();
+}
+
+void print_summary(const CampaignData& data, const Reduction& reduction, const Summary& summary,
+                   Convention convention) {
+  const double factor = convert_coefficient(1, Convention::kThesis, convention, data.info.rig);
+  const bool has_u = data.info.rig.rotors == kMaxRotors;
+  const auto number = [](double value, const char* format) {
+    return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "-";
+  };
+  const auto place = [](std::optional<double> value) { return value ? fmt::format("{:g}", *value) : "-"; };
+  Table table({"location", "y_norm", "z_norm", "runs", "C_T", "std", "U95", "U [%]", "std [%]", "U95 [%]",
+               "thrust [N]"});
+  for (const LocationSummary& location : summary.locations) {
+    table.add({location.label, place(location.y_norm), place(location.z_norm),
+               fmt::format("{}", location.runs), number(factor * location.c_t.mean, "{:.5f}"),
+               number(factor * location.c_t.std, "{:.5f}"), number(factor * location.c_t.u95, "{:.5f}"),
+               has_u ? number(location.u_percent.mean, "{:.3f}") : "-",
+               has_u ? number(location.u_percent.std, "{:.3f}") : "-",
+               has_u ? number(location.u_percent.u95, "{:.3f}") : "-", number(location.thrust_N, "{:.3f}")});
+  }
+  table.print();
+  fmt::print("\n{} runs at {} locations; model {}, convention {}\n", reduction.runs.size(),
+             summary.locations.size(), reduction.terms.name(), name_of(convention));
+  for (const std::string& note : summary.notes) fmt::print("note: {}\n", note);
+}
+
+/// Says what was left out. True where that needs mending.
+bool warn_of_left_out(const CampaignData& data, const Reduction& reduction) {
+  bool problem = false;
+  for (const LeftOutRun& run : reduction.left_out) {
+    warn(fmt::format("run {} is left out: {}", run.run, run.reason));
+    problem |= run.problem;
+  }
+  std::size_t clipped = 0, moving = 0, untared = 0;
+  for (const RunCoefficients& run : reduction.runs) {
+    clipped += run.clipped > 0 ? 1 : 0;
+    moving += run.stationary ? 0 : 1;
+    untared += run.zero_from_calibration ? 1 : 0;
+  }
+  if (clipped > 0)
+    warn(fmt::format("{} runs hold clipped samples, which bias their means (`tunnelrig doctor`)", clipped));
+  if (moving > 0)
+    warn(fmt::format("{} runs drift by more than their noise explains (`tunnelrig doctor`)", moving));
+  if (untared > 0 && data.certificate) {
+    warn(fmt::format("{} runs have no tare in their session; their zero is the calibration's, extrapolated",
+                     untared));
+  }
+  return problem;
+}
+
+int reduce_campaign(const Options& options, const CampaignFile& file) {
+  CampaignData data = read_campaign_data(file);
+  const bool agreed = !options.from_raw || refresh_from_raw(options, data);
+  const Convention convention =
+      convention_from_name(options.convention.empty() ? "thesis" : options.convention);
+  const Reduction reduction = reduce_runs(data, terms_from_names(options.terms));
+  const Summary summary = summarize_locations(data, reduction);
+  const bool problem = warn_of_left_out(data, reduction);
+  const std::string json = reduction_json(data, reduction, summary, convention);
+  if (!options.csv.empty()) write_text(options.csv, locations_csv(summary, data.info.rig, convention));
+  if (!options.runs_csv.empty()) write_text(options.runs_csv, runs_csv(data, reduction, convention));
+  CampaignFile(options.db, CampaignFile::Access::kWrite)
+      .add_document("reduction", {program_version(), arguments(), inputs_json(data)}, json);
+  if (options.json)
+    fmt::print("{}\n", json);
+  else
+    print_summary(data, reduction, summary, convention);
+  return problem || !agreed ? kProblemFound : kWell;
+}
+
+int reduce_table(const Options& options, const CampaignFile& file) {
+  const Convention convention =
+      convention_from_name(options.convention.empty() ? "propeller" : options.convention);
+  const TableReduction reduction = reduce_table_rows(observations_of(file), convention);
+  if (!options.csv.empty()) write_text(options.csv, observations_csv(reduction));
+  if (!options.plot.empty()) {
+    if (const auto reason = draw_coefficients(reduction, options.plot))
+      throw InputError(fmt::format("--plot {}: {}", options.plot, *reason));
+  }
+  if (options.json) {
+    fmt::print("{}\n", table_reduction_json(reduction));
+    return kWell;
+  }
+  Table table({"group", "rows", "speed from [rpm]", "to [rpm]", "C_T median", "spread", "C_T at the lowest",
+               "at the highest"});
+  for (const TableGroup& group : reduction.groups) {
+    table.add({group.name, fmt::format("{}", group.rows.size()),
+               fmt::format("{:.0f}", group.lowest_speed_rpm), fmt::format("{:.0f}", group.highest_speed_rpm),
+               fmt::format("{:.5f}", group.median), fmt::format("{:.5f}", group.spread),
+               fmt::format("{:.5f}", group.at_lowest), fmt::format("{:.5f}", group.at_highest)});
+  }
+  table.print();
+  fmt::print("\n{} observations in {} groups; convention {}\n", reduction.rows.size(),
+             reduction.groups.size(), name_of(convention));
+  if (reduction.at_rest > 0) {
+    fmt::print("{} rows are left out: the motor stood, or its tachometer had not locked\n",
+               reduction.at_rest);
+  }
+  if (!reduction.doubtful.empty()) {
+    warn(
+        fmt::format("{} rows have a C_T more than three times off their group's median; first in line {}: is "
+                    "the speed right?",
+                    reduction.doubtful.size(), reduction.doubtful.front()));
+  }
+  if (reduction.unknown > 0) {
+    warn(fmt::format("{} rows are left out: their speed or propeller diameter is not known",
+                     reduction.unknown));
+  }
+  return reduction.unknown > 0 ? kProblemFound : kWell;
+}
+
+int run(const Options& options) {
+  const CampaignFile file(options.db, CampaignFile::Access::kRead);
+  return file.text("table.toml") ? reduce_table(options, file) : reduce_campaign(options, file);
+}
+
+}  // namespace
+
+void add_reduce(CLI::App& app, Work& work) {
+  auto options = std::make_shared<Options>();
+  CLI::App* verb =
+      app.add_subcommand("reduce", "Runs to calibrated thrusts, C_T and U, per run and per location");
+  verb->footer(
+      "U95 is the expanded uncertainty (95 %); docs/reduction.md has its budget. A table of observations is "
+      "reduced to C_T per row.\n\n"
+      "Examples: tunnelrig reduce --db my.db --csv coefficients.csv\n"
+      "          tunnelrig reduce --db my.db --with air_pressure,rotor_speed --json");
+  verb->add_option("--db", options->db, "Campaign file")->required();
+  verb->add_option("--csv", options->csv, "Write one row per location (of a table: per observation)");
+  verb->add_option("--runs-csv", options->runs_csv, "Write one row per run");
+  verb->add_option(
+          "--with", options->terms,
+          "Measured conditions that enter the model: air_pressure, air_humidity, rotor_speed; thesis: none")
+      ->capture_default_str();
+  verb->add_option("--convention", options->convention,
+                   "Of C_T: thesis, helicopter or propeller (thesis; of a table: propeller)");
+  verb->add_option("--plot", options->plot, "Of a table: draw C_T against speed (.svg or .png)");
+  verb->add_flag("--from-raw", options->from_raw,
+                 "Compute the runs' statistics again from their raw data, and compare");
+  verb->add_flag("--no-spectra", options->no_spectra, "With --from-raw: leave the spectra out");
+  verb->add_flag("--json", options->json, "Print as JSON");
+  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+}
+
+}  // namespace tunnelrig::cli

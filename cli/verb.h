@@ -1,0 +1,23 @@
+// A verb is one file: it declares its options on a CLI11 command and sets the function that does its work.
+#pragma once
+
+#include <functional>
+
+#include <CLI/CLI.hpp>
+
+namespace tunnelrig::cli {
+
+/// Declares a verb below `app`; its work goes into `run`, which returns the exit code.
+using Work = std::function<int()>;
+
+void add_log(CLI::App& app, Work& run);
+void add_plan(CLI::App& app, Work& run);
+void add_import(CLI::App& app, Work& run);
+void add_export(CLI::App& app, Work& run);
+void add_calibrate(CLI::App& app, Work& run);
+void add_reduce(CLI::App& app, Work& run);
+void add_map(CLI::App& app, Work& run);
+void add_report(CLI::App& app, Work& run);
+void add_doctor(CLI::App& app, Work& run);
+
+}  // namespace tunnelrig::cli

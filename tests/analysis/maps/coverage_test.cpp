@@ -1,0 +1,111 @@
+#include "analysis/maps/tunnel_maps.h"
+#include "published_input.h"
+#include "support/seeds.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+constexpr int kCampaigns = 50, kPoints = 100;
+
+/// Share of the points, off the locations' grid and over campaigns, where the interval holds the true value.
+struct Coverage {
+  double delta_ct = 0, uneven_thrust = 0;
+  double both() const { return (delta_ct + uneven_thrust) / 2; }
+};
+
+Coverage coverage(std::uint64_t seed, const test::MeasurementErrors& errors) {
+  std::mt19937_64 engine(seed);
+  std::uniform_real_distribution<double> anywhere(-1, 1);
+  std::array<int, 2> covered = {0, 0};
+  for (std::uint64_t campaign = 0; campaign < kCampaigns; ++campaign) {
+    const TunnelMaps maps = fit_maps(test::published_input(seed + campaign, errors));
+    for (int i = 0; i < kPoints; ++i) {
+      const TunnelPoint point{anywhere(engine), anywhere(engine)};
+      const FieldEstimate delta_ct = estimate_at(maps.delta_ct, point);
+      const FieldEstimate uneven = estimate_at(maps.uneven_thrust, point);
+      covered[0] += std::abs(delta_ct.value - test::true_delta_ct_percent(point)) <
+                    1.96 * delta_ct.standard_uncertainty;
+      covered[1] += std::abs(uneven.value - test::true_uneven_thrust_percent(point)) <
+                    1.96 * uneven.standard_uncertainty;
+    }
+  }
+  return {static_cast<double>(covered[0]) / (kCampaigns * kPoints),
+          static_cast<double>(covered[1]) / (kCampaigns * kPoints)};
+}
+
+TEST(Coverage, OfTheGaussianProcessIsNearNominal) {
+  const std::uint64_t seed = test::seed();
+  for (const double error_percent : {0.05, 0.1, 0.2}) {
+    for (const double shared_percent : {0.0, 0.5}) {
+      const Coverage measured = coverage(seed, {.independent_percent = error_percent,
+                                                .shared_gain_percent = 2 * shared_percent,
+                                                .shared_u_percent = shared_percent});
+      std::printf("seed %llu, errors %.2f %%, shared %.1f %%: coverage of dC_T %.3f, of U %.3f\n",
+                  static_cast<unsigned long long>(seed), error_percent, shared_percent, measured.delta_ct,
+                  measured.uneven_thrust);
+      EXPECT_GT(measured.both(), 0.90);
+      EXPECT_LT(measured.both(), 0.98);
+      // The field's ΔC_T is smoother than the kernel, its U rougher than the locations can show
+      // (docs/maps.md).
+      EXPECT_GT(measured.delta_ct, 0.93);
+      EXPECT_GT(measured.uneven_thrust, 0.85);
+    }
+  }
+}
+
+/// Means over campaigns of one field's errors in percentage points.
+struct FieldErrors {
+  double leave_one_out = 0, standardised = 0, off_grid = 0;
+
+  void add(const FittedField& field, double (*truth)(const TunnelPoint&), std::mt19937_64& engine) {
+    const LeaveOneOutSummary summary = summarize(tunnelrig::leave_one_out(field));
+    leave_one_out += summary.rms_percent / kCampaigns;
+    standardised += summary.standardised_rms.value_or(0) / kCampaigns;
+    std::uniform_real_distribution<double> anywhere(-1, 1);
+    double squares = 0;
+    for (int i = 0; i < kPoints; ++i) {
+      const TunnelPoint point{anywhere(engine), anywhere(engine)};
+      squares += std::pow(estimate_at(field, point).value - truth(point), 2);
+    }
+    off_grid += std::sqrt(squares / kPoints) / kCampaigns;
+  }
+};
+
+TEST(LeaveOneOut, TellsTheErrorThatTheMapHas) {
+  const std::uint64_t seed = test::seed();
+  std::mt19937_64 engine(seed);
+  for (const double error_percent : {0.05, 0.1, 0.2}) {
+    for (const MapMethod method : test::kMethods) {
+      FieldErrors delta_ct, uneven;
+      for (std::uint64_t campaign = 0; campaign < kCampaigns; ++campaign) {
+        const MapInput input = test::published_input(seed + campaign, {.independent_percent = error_percent});
+        const TunnelMaps maps = fit_maps(input, {.method = method});
+        delta_ct.add(maps.delta_ct, test::true_delta_ct_percent, engine);
+        uneven.add(maps.uneven_thrust, test::true_uneven_thrust_percent, engine);
+      }
+      std::printf(
+          "seed %llu, errors %.2f %%, %s: leave-one-out %.3f / %.3f, standardised %.2f / %.2f, off grid %.3f "
+          "/ %.3f\n",
+          static_cast<unsigned long long>(seed), error_percent, name_of(method).c_str(),
+          delta_ct.leave_one_out, uneven.leave_one_out, delta_ct.standardised, uneven.standardised,
+          delta_ct.off_grid, uneven.off_grid);
+      // A left-out location is farther from its neighbours than any point of the map is.
+      EXPECT_LT(delta_ct.off_grid, 1.1 * delta_ct.leave_one_out);
+      EXPECT_LT(uneven.off_grid, 1.3 * uneven.leave_one_out);
+      if (method == MapMethod::kGaussianProcess) {
+        EXPECT_NEAR(delta_ct.standardised, 1, 0.35);
+        EXPECT_NEAR(uneven.standardised, 1, 0.35);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tunnelrig

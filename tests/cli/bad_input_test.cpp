@@ -1,0 +1,123 @@
+// Bad input: a message that names file, line and rule, exit code 2, nothing half-written.
+#include "cli/program.h"
+#include "datasets/csv.h"
+#include "support/example_campaign.h"
+#include "support/temporary_folder.h"
+
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+namespace fs = std::filesystem;
+using test::ProgramResult;
+using testing::HasSubstr;
+
+struct BadInput : testing::Test {
+  test::TemporaryFolder folder;
+  test::ExampleCampaign campaign;
+
+  /// What importing the campaign says; it must be refused and leave nothing behind.
+  std::string refusal() {
+    fs::remove_all(folder / "source");
+    campaign.write(folder / "source");
+    return refusal_of("import source --db c.db", {"source"});
+  }
+
+  std::string refusal_of(const std::string& arguments, const std::vector<std::string>& files) const {
+    const ProgramResult result = test::run_program(folder.path(), arguments);
+    EXPECT_EQ(result.code, 2) << arguments << "\n" << result.error;
+    EXPECT_EQ(result.out, "") << arguments;
+    std::vector<std::string> left;
+    for (const auto& entry : fs::directory_iterator(folder.path()))
+      left.push_back(entry.path().filename().string());
+    EXPECT_THAT(left, testing::UnorderedElementsAreArray(files)) << arguments;
+    return result.error;
+  }
+
+  static void replace(std::string& text, const std::string& from, const std::string& to) {
+    const auto at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+  }
+};
+
+TEST_F(BadInput, WrongUnit) {
+  replace(campaign.runs_csv, "air_temperature_C", "air_temperature_K");
+  EXPECT_THAT(refusal(),
+              HasSubstr("runs.csv:1: column air_temperature_K: this quantity is read as air_temperature_C"));
+  campaign = {};
+  replace(campaign.runs_csv, "20.5", "293.65");
+  EXPECT_THAT(refusal(), HasSubstr("runs.csv:2: column air_temperature_C: 293.65 is outside"));
+}
+
+TEST_F(BadInput, MissingColumn) {
+  replace(campaign.calibration_csv, "voltage_V", "reading");
+  EXPECT_THAT(refusal(), HasSubstr("calibration.csv:1: the required column voltage_V is missing"));
+}
+
+TEST_F(BadInput, NotANumber) {
+  replace(campaign.runs_csv, "4999.0", "NaN");
+  EXPECT_THAT(refusal(), HasSubstr("runs.csv:3: column speed_rpm: 'NaN' is not a finite decimal number"));
+}
+
+TEST_F(BadInput, BelowAbsoluteZero) {
+  replace(campaign.runs_csv, "18.0", "-280");
+  EXPECT_THAT(refusal(), HasSubstr("below absolute zero"));
+}
+
+TEST_F(BadInput, ZeroFramesAndStuckChannel) {
+  campaign.write(folder / "source");
+  test::write_npy(folder / "source/raw/R3.npy", {}, 0, {});
+  EXPECT_THAT(refusal_of("import source --db c.db", {"source"}),
+              HasSubstr("runs.csv:4: run R3: raw/R3.npy holds zero frames"));
+  auto stuck = test::example_frames(400, 1);
+  for (std::size_t i = 0; i < 400; ++i) stuck[i * 8] = stuck[i * 8 + 1] = std::byte{4};
+  test::write_npy(folder / "source/raw/R3.npy", {}, 400, stuck);
+  EXPECT_THAT(refusal_of("import source --db c.db", {"source"}),
+              HasSubstr("channel 1 of raw/R3.npy is stuck"));
+}
+
+TEST_F(BadInput, AMapOfTwoLocations) {
+  campaign.write(folder / "source");
+  ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
+  EXPECT_THAT(refusal_of("map --db c.db --out maps", {"source", "c.db"}),
+              HasSubstr("`tunnelrig calibrate` comes before"));
+  ASSERT_NE(test::run_program(folder.path(), "calibrate --db c.db").code, 2);
+  EXPECT_THAT(refusal_of("map --db c.db --out maps", {"source", "c.db"}),
+              HasSubstr("2 locations make no map; at least 4 are needed"));
+}
+
+TEST_F(BadInput, IntoAFileThatHoldsACampaign) {
+  campaign.write(folder / "source");
+  ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
+  EXPECT_THAT(refusal_of("import source --db c.db", {"source", "c.db"}),
+              HasSubstr("already holds a campaign"));
+  EXPECT_EQ(test::run_program(folder.path(), "import source --db c.db --replace").code, 0);
+}
+
+TEST_F(BadInput, OptionsAndFilesThatAreNotThere) {
+  EXPECT_THAT(refusal_of("reduce --db none.db", {}), HasSubstr("none.db: there is no such campaign file"));
+  EXPECT_THAT(refusal_of("log --db c.db --location OT", {}),
+              HasSubstr("--location and --session are required"));
+  EXPECT_THAT(refusal_of("import none --db c.db", {}), HasSubstr("there is no such campaign folder"));
+  EXPECT_THAT(refusal_of("import t.csv --format table --db c.db", {}),
+              HasSubstr("--schema S.toml is required"));
+  EXPECT_THAT(refusal_of("fly --now", {}), testing::Not(testing::IsEmpty()));
+  EXPECT_THAT(refusal_of("log --db c.db --plan none.csv", {}), HasSubstr("none.csv: cannot be read"));
+}
+
+TEST_F(BadInput, CalibrationThatSaysNothing) {
+  campaign.calibration_csv =
+      "cell,applied_force_N,voltage_V\n1,5,1.5\n1,6,1.8\n2,5,1.5\n2,6,1.8\n3,5,1.5\n3,6,1.8\n4,5,1.5\n4,6,1."
+      "8\n";
+  campaign.write(folder / "source");
+  ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
+  EXPECT_THAT(refusal_of("calibrate --db c.db", {"source", "c.db"}), HasSubstr("cell 1"));
+}
+
+}  // namespace
+}  // namespace tunnelrig

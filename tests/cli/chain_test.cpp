@@ -1,0 +1,174 @@
+// From bytes to a map with the program itself: what `./rig demo` does, with shorter runs.
+#include "analysis/maps/disturbance_map.h"
+#include "cli/program.h"
+#include "datasets/csv.h"
+#include "datasets/locations.h"
+#include "support/field_claims.h"
+#include "support/temporary_folder.h"
+
+#include <map>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig {
+namespace {
+
+using test::ProgramResult;
+using testing::HasSubstr;
+
+struct Chain : testing::Test {
+  test::TemporaryFolder folder;
+
+  ProgramResult run(const std::string& arguments) const {
+    return test::run_program(folder.path(), arguments);
+  }
+
+  void expect_well(const std::string& arguments) const {
+    const ProgramResult result = run(arguments);
+    EXPECT_EQ(result.code, 0) << arguments << "\n" << result.error << result.out;
+  }
+};
+
+/// The value of a map's CSV at each node of its grid.
+class Grid {
+ public:
+  explicit Grid(const std::filesystem::path& csv) {
+    const Sheet sheet = read_csv(csv);
+    EXPECT_EQ(sheet.columns, (std::vector<std::string>{"y_norm", "z_norm", "value_percent", "u95_percent"}));
+    for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
+      values_[{sheet.require_number(row, "y_norm"), sheet.require_number(row, "z_norm")}] =
+          sheet.require_number(row, "value_percent");
+    }
+  }
+
+  /// Bilinear between nodes, as flight reads it.
+  double at(double y, double z) const {
+    const double step = 0.05;
+    const auto below = [&](double x) { return std::min(std::floor((x + 1) / step + 1e-9), 39.0); };
+    const double i = below(y), j = below(z), u = (y + 1) / step - i, v = (z + 1) / step - j;
+    return (1 - u) * (1 - v) * node(i, j) + u * (1 - v) * node(i + 1, j) + (1 - u) * v * node(i, j + 1) +
+           u * v * node(i + 1, j + 1);
+  }
+
+  bool holds_origin() const { return values_.contains({0.0, 0.0}); }
+
+ private:
+  double node(double i, double j) const {
+    const auto close = [](double k) { return std::round((-1 + 0.05 * k) * 1e9) / 1e9; };
+    return values_.at({close(i), close(j)});
+  }
+  std::map<std::pair<double, double>, double> values_;
+};
+
+TEST_F(Chain, DemoMakesAMapThatSatisfiesTheThesis) {
+  expect_well("plan --out plan.csv --duration 5");
+  expect_well("log --db c.db --plan plan.csv --speed max");
+  expect_well("calibrate --db c.db");
+  expect_well("reduce --db c.db --csv coefficients.csv --runs-csv runs.csv");
+  expect_well("reduce --db c.db --from-raw");
+  expect_well("map --db c.db --out maps");
+  expect_well("doctor --db c.db");
+  expect_well("report --db c.db --out report.html");
+
+  const Sheet coefficients = read_csv(folder / "coefficients.csv");
+  const std::vector<std::string> first = {"location",      "y_norm",       "z_norm",  "runs",
+                                          "c_t",           "c_t_std",      "c_t_u95", "u_percent",
+                                          "u_percent_std", "u_percent_u95"};
+  ASSERT_GE(coefficients.columns.size(), first.size());
+  EXPECT_EQ(std::vector<std::string>(coefficients.columns.begin(), coefficients.columns.begin() + 10), first);
+  EXPECT_EQ(coefficients.rows.size(), 42u + 1 + 10 + 9)
+      << "one row per location, open space included, and nothing else";
+  for (std::size_t row = 0; row < coefficients.rows.size(); ++row) {
+    const std::string& location = coefficients.text(row, "location");
+    const double c_t = coefficients.require_number(row, "c_t"),
+                 u95 = coefficients.require_number(row, "c_t_u95");
+    if (location == "OS") {
+      EXPECT_NEAR(c_t, 0.1056, 2 * u95);
+    }
+    if (location == "OT") {
+      EXPECT_NEAR(c_t, 0.1071, 2 * u95);
+    }
+  }
+
+  const Grid delta_ct(folder / "maps/delta_ct.csv"), uneven(folder / "maps/uneven_thrust.csv");
+  EXPECT_TRUE(delta_ct.holds_origin());
+  test::expect_thesis_claims([&](double y, double z) { return delta_ct.at(y, z); },
+                             [&](double y, double z) { return uneven.at(y, z); }, 0.35);
+  EXPECT_NO_THROW(read_disturbance_map(folder / "maps/disturbance_map.json"));
+}
+
+TEST_F(Chain, PlanResumesWhereItStopped) {
+  expect_well("plan --out plan.csv --tunnel-only --repeats 2 --duration 1");
+  const Sheet plan = read_csv(folder / "plan.csv");
+  std::string half;
+  Sheet first = plan;
+  first.rows.resize(plan.rows.size() / 2);
+  write_text(folder / "half.csv", format_csv(first));
+  expect_well("log --db c.db --plan half.csv --speed max");
+  const ProgramResult rest = run("log --db c.db --plan plan.csv --speed max");
+  EXPECT_EQ(rest.code, 0);
+  EXPECT_THAT(rest.out, HasSubstr(std::to_string(plan.rows.size() - first.rows.size()) + " of " +
+                                  std::to_string(plan.rows.size()) + " runs to record"));
+  expect_well("log --db whole.db --plan plan.csv --speed max");
+  expect_well("export --db c.db one");
+  expect_well("export --db whole.db other");
+  EXPECT_EQ(read_text(folder / "one/runs.csv"), read_text(folder / "other/runs.csv"))
+      << "the virtual rig does not depend on the break";
+  EXPECT_THAT(run("log --db c.db --plan plan.csv --speed max").out, HasSubstr("0 of "));
+}
+
+TEST_F(Chain, LossesAreSaidAndExitWithOne) {
+  const ProgramResult lossy = run(
+      "log --db c.db --location OT --session S1 --duration 20 --speed max --faults drop=0.02,reboot=5:0.5");
+  EXPECT_EQ(lossy.code, 1);
+  EXPECT_THAT(lossy.error, HasSubstr("frames lost"));
+  EXPECT_THAT(lossy.error, HasSubstr("1 reboots"));
+  expect_well("calibrate --db c.db");
+  const ProgramResult doctor = run("doctor --db c.db");
+  EXPECT_EQ(doctor.code, 1);
+  EXPECT_THAT(doctor.out, HasSubstr("more than 1 % of the frames lost in R0001"));
+}
+
+TEST_F(Chain, JsonForMachines) {
+  expect_well("plan --out plan.csv --tunnel-only --repeats 2 --duration 2");
+  expect_well("log --db c.db --plan plan.csv --speed max");
+  for (const char* arguments : {"calibrate --db c.db --json", "reduce --db c.db --json",
+                                "map --db c.db --out m --json", "doctor --db c.db --json"}) {
+    const ProgramResult result = run(arguments);
+    EXPECT_TRUE(nlohmann::json::accept(result.out)) << arguments << "\n" << result.out.substr(0, 500);
+  }
+  const auto reduction = nlohmann::json::parse(run("reduce --db c.db --json").out);
+  EXPECT_EQ(reduction["locations"].size(), 42u);
+  const double thesis = reduction["locations"][0]["c_t"]["mean"];
+  const double propeller = nlohmann::json::parse(
+      run("reduce --db c.db --json --convention propeller").out)["locations"][0]["c_t"]["mean"];
+  EXPECT_NEAR(propeller / thesis, 3.14159265 * 3.14159265 * 3.14159265 / 32, 1e-6);
+}
+
+TEST_F(Chain, MeasuredConditionsEnterOnlyByName) {
+  expect_well("plan --out plan.csv --tunnel-only --repeats 2 --duration 2");
+  expect_well("log --db c.db --plan plan.csv --speed max");
+  expect_well("calibrate --db c.db");
+  const auto c_t = [&](const std::string& with) {
+    return nlohmann::json::parse(run("reduce --db c.db --json" + with).out)["locations"][3]["c_t"]["std"]
+        .get<double>();
+  };
+  EXPECT_NE(c_t(""), c_t(" --with rotor_speed"));
+  EXPECT_EQ(c_t(""), c_t(" --with thesis"));
+  EXPECT_EQ(run("reduce --db c.db --with moonlight").code, 2);
+}
+
+TEST_F(Chain, HelpOfEveryVerbShowsAnExample) {
+  for (const char* verb :
+       {"log", "plan", "import", "export", "calibrate", "reduce", "map", "report", "doctor"}) {
+    const ProgramResult help = run(std::string(verb) + " --help");
+    EXPECT_EQ(help.code, 0) << verb;
+    EXPECT_THAT(help.out, HasSubstr("Example")) << verb;
+    EXPECT_THAT(help.out, HasSubstr(std::string("tunnelrig ") + verb)) << verb;
+  }
+}
+
+}  // namespace
+}  // namespace tunnelrig
