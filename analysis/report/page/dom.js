@@ -14,7 +14,7 @@ function h(tag, attributes = {}, ...children) {
 /** Text with `code` in backticks and the subscripts of C_T, U95 and the tunnel's lengths, as nodes. */
 function prose(text) {
   return text.split(/(`[^`]*`|\b[A-Za-z]_[A-Za-z]\b|\bU95\b)/).map((part) => {
-    if (part.startsWith("`")) return h("code", {}, part.slice(1, -1));
+    if (part.startsWith("`")) return code(part.slice(1, -1));
     if (/^[A-Za-z]_[A-Za-z]$/.test(part)) return h("span", {class: "symbol"}, part[0], h("sub", {}, part[2]));
     if (part === "U95") return h("span", {class: "symbol"}, "U", h("sub", {}, "95"));
     return part;
@@ -49,15 +49,22 @@ const counted = (n, noun) => `${n.toLocaleString("en")} ${noun}${n === 1 ? "" : 
 /** "2026-03-02 08:00" */
 const utc = (seconds) => new Date(seconds * 1000).toISOString().slice(0, 16).replace("T", " ");
 
-/** A table with a caption for those who cannot see it. Columns: {name, cell(row), text: set flush left}. */
-function table(caption, columns, rows) {
+/** A table that scrolls within the page, under its title. Columns: {name, cell(row), text: set flush left}. */
+function table(title, columns, rows) {
   const side = (column) => (column.text ? {class: "text"} : {});
-  return h("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": caption},
-    h("table", {},
-      h("caption", {}, prose(caption)),
-      h("thead", {}, h("tr", {}, columns.map((c) => h("th", {scope: "col", ...side(c)}, prose(c.name))))),
-      h("tbody", {}, rows.map((row) => h("tr", {}, columns.map((c) => h("td", side(c), c.cell(row))))))));
+  return h("div", {class: "table"},
+    h("p", {class: "table-title"}, prose(title)),
+    h("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": title},
+      h("table", {"aria-label": title},
+        h("thead", {}, h("tr", {}, columns.map((c) => h("th", {scope: "col", ...side(c)}, prose(c.name))))),
+        h("tbody", {}, rows.map((row) => h("tr", {}, columns.map((c) => h("td", side(c), c.cell(row)))))))));
 }
+
+/** A command line, which breaks between its words only. */
+const code = (line) => h("code", {}, line.split(" ").flatMap((word, i) => [i ? " " : "", h("span", {class: "word"}, word)]));
+
+/** "Numbers: tunnelrig reduce …": what makes the numbers again. */
+const remade = (line) => h("span", {class: "remade"}, "Numbers: ", code(line));
 
 /** What is long and rarely read: filled when it is opened. */
 function folded(summary, fill) {
@@ -71,7 +78,7 @@ function figure(title, controls, plots, caption, command) {
   return h("figure", {},
     h("div", {class: "figure-head"}, h("h3", {}, prose(title)), controls),
     plots,
-    h("figcaption", {}, prose(caption), " ", h("span", {class: "remade"}, "Numbers: ", h("code", {}, command))));
+    h("figcaption", {}, prose(caption), " ", remade(command)));
 }
 
 /** Radio buttons; `change` is called with the value chosen. */

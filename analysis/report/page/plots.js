@@ -20,7 +20,7 @@ addEventListener("unhandledrejection", (event) => fail(event.reason));
 // The buttons are named one by one: among Plotly's own is one that sends the data to its makers' server.
 const config = {
   displaylogo: false, displayModeBar: matchMedia("(hover: hover)").matches ? "hover" : false,
-  modeBarButtons: [["toImage", "zoom2d", "pan2d", "resetScale2d"]], toImageButtonOptions: {format: "svg"}, plotlyServerURL: ""};
+  modeBarButtons: [["toImage", "zoom2d", "pan2d", "autoScale2d", "resetScale2d"]], toImageButtonOptions: {format: "svg"}, plotlyServerURL: ""};
 
 /**
  * A place for a plot. `build(width)` gives {data, layout}, anew for every width and theme; `height(width)` is in pixels.

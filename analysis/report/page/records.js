@@ -5,7 +5,7 @@ const badge = (kind, text) => h("span", {class: `badge ${kind}`}, text);
 const findingsSection = (findings) => [
   h("ul", {class: "findings"}, findings.map(({severity, check, found, advice}) =>
     h("li", {}, badge(severity, severity), " ", h("strong", {}, check), " ", prose(found), advice ? h("div", {class: "advice"}, "→ ", prose(advice)) : []))),
-  h("p", {class: "remade"}, "Made by: ", h("code", {}, command("doctor"))),
+  h("p", {}, remade(command("doctor"))),
 ];
 
 function leftOut(runs) {
@@ -32,7 +32,7 @@ function locationTable({locations, left_out: left}) {
       ...uneven,
       {name: "thrust [N]", cell: (l) => fixed(l.thrust_N, 3)},
     ], locations),
-    h("p", {class: "remade"}, "Numbers: ", h("code", {}, command("reduce", "--csv coefficients.csv"))),
+    h("p", {}, remade(command("reduce", "--csv coefficients.csv"))),
     leftOut(left),
   ];
 }
@@ -59,7 +59,7 @@ function provenanceSection(documents) {
   const {program, arguments: made, created_utc: created, db, model} = report.made;
   const {calibration} = report.sections;
   const facts = [
-    ["This page", [h("code", {}, made), h("br"), `${program}, ${created}`]],
+    ["This page", [code(made), h("br"), `${program}, ${created}`]],
     ["Campaign file", h("code", {}, db)],
     ...(report.kind === "table" ? [] : [["Model", `${model}${model === "thesis" ? ": dry air at 101325 Pa, nominal speed" : ""}`]]),
     ...(calibration && !calibration.absent ? [["Calibration", [`document ${calibration.id}, of points `, h("code", {}, calibration.points_hash)]]] : []),
@@ -71,7 +71,7 @@ function provenanceSection(documents) {
       {name: "kind", cell: (d) => d.kind, text: true},
       {name: "made (UTC)", cell: (d) => d.created_utc, text: true},
       {name: "program", cell: (d) => d.program, text: true},
-      {name: "command", cell: (d) => h("code", {}, d.arguments), text: true},
+      {name: "command", cell: (d) => code(d.arguments), text: true},
       {name: "from", cell: (d) => h("span", {class: "wrap"}, inputsText(d.inputs)), text: true},
     ], documents) : h("p", {}, "The file holds nothing derived yet."),
     report.runs ? folded(`All ${counted(report.runs.run.length, "run")}, with the hashes of their raw data`, runTable) : [],

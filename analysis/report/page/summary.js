@@ -57,7 +57,7 @@ function headOfCampaign() {
 function headOfTable() {
   const {table} = report.sections;
   return [
-    h("p", {class: "origin unknown"}, "A table of somebody else's observations: this program recorded none of them."),
+    h("p", {class: "origin unknown"}, "A table of observations made elsewhere: this program recorded none of them."),
     h("p", {class: "summary"}, prose(table.absent ? `${counted(report.observations, "observation")}.`
       : `${counted(report.observations, "observation")}, ${counted(table.reduced, "value")} of C_T in ${counted(table.groups.length, "group")}.`)),
   ];

@@ -15,12 +15,19 @@ function backdrop(groups) {
     opacity: 0.4, hoverinfo: "skip"};
 }
 
+/** From 0 to what all but one in a hundred rows say: a propeller that hardly turns has a coefficient of any size. */
+function usualRange(groups) {
+  const values = groups.flatMap((g) => g.c_t).sort((a, b) => a - b);
+  const quantile = (share) => values[Math.round(share * (values.length - 1))];
+  return [Math.min(0, 1.1 * quantile(0.01)), 1.1 * quantile(0.99)];
+}
+
 function drawSweeps(section, chosen) {
   const colours = [...rotorColours(), ...budgetColours().slice(4)];
   const shown = chosen.slice(0, kFew);
   const data = shown.map((k, i) => sweepTrace(section.groups[k], colours[i % colours.length], i));
   return {data: section.groups.length > shown.length ? [backdrop(section.groups), ...data] : data, layout: {
-    xaxis: axis("speed [rev/min]"), yaxis: axis(`C<sub>T</sub> (${section.convention} convention)`, {rangemode: "tozero"}),
+    xaxis: axis("speed [rev/min]"), yaxis: axis(`C<sub>T</sub> (${section.convention} convention)`, {range: usualRange(section.groups)}),
     showlegend: true, legend: {orientation: "h", y: -0.2, yanchor: "top"}}};
 }
 
@@ -42,8 +49,8 @@ function sweepFigure(section) {
   const place = plot("C_T against speed by group; the table beneath has a summary", (width) => (isNarrow(width) ? 460 : 500), () => drawSweeps(section, chosen));
   const picker = groups.length > 1 ? groupPicker(groups, (now) => { chosen = now; redraw(place); }) : [];
   return figure("Thrust coefficient against speed", [], h("div", {class: "with-picker"}, picker, place),
-    `C_T of one rotor, from ${section.response}${section.response_unit ? ` [${section.response_unit}]` : ""}, speed, diameter and air of each row, in the ${section.convention} ` +
-    "convention. Faint lines: all groups. A table carries no repeats of its own, so there are no error bars: the scatter along a curve is what is known." +
+    `C_T of one rotor, from the column ${section.response}${section.response.includes(section.response_unit) ? "" : ` [${section.response_unit}]`}, speed, diameter and air of each row, in the ${section.convention} ` +
+    "convention. Faint lines: all groups; one row in a hundred lies outside the picture (double-click to see all). A table carries no repeats of its own, so there are no error bars: the scatter along a curve is what is known." +
     `${section.left_out ? ` ${counted(section.left_out, "row")} left out, whose speed or diameter is not known.` : ""}`, command("reduce", "--csv coefficients.csv"));
 }
 
