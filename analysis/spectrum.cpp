@@ -19,6 +19,7 @@ namespace {
 constexpr std::size_t kWindow = 4096;
 constexpr std::size_t kShortestWindow = 128;
 constexpr std::size_t kMostLines = 12;
+constexpr std::size_t kNoiseStep = 24;  // bins
 constexpr double kShaftBand = 0.04;
 
 /// Plans are made once per length; FFTW's planner is the one part of it that threads must not share.
@@ -124,18 +125,22 @@ std::span<const double> WelchSpectrum::power(std::size_t channel) const {
 
 namespace {
 
-/// The noise around a bin: the median of up to 48 bins on each side, the line's own three left out.
-double noise_around(std::span<const double> power, std::size_t bin) {
+/// The noise that lines stand in: medians of the power over 97 bins, one every 24 bins, so that a line or two
+/// among them do not count.
+std::vector<double> noise_floor(std::span<const double> power) {
   constexpr std::size_t kReach = 48;
+  std::vector<double> floor;
   std::vector<double> around;
-  const std::size_t from = bin > kReach ? bin - kReach : 1;
-  const std::size_t to = std::min(bin + kReach, power.size() - 1);
-  for (std::size_t k = from; k <= to; ++k) {
-    if (k + 2 < bin || k > bin + 2) around.push_back(power[k]);
+  for (std::size_t centre = 0; centre < power.size() + kNoiseStep / 2; centre += kNoiseStep) {
+    const std::size_t from = centre > kReach ? centre - kReach : 1;
+    const std::size_t to = std::min(centre + kReach + 1, power.size());
+    around.assign(power.begin() + static_cast<std::ptrdiff_t>(std::min(from, to - 1)),
+                  power.begin() + static_cast<std::ptrdiff_t>(to));
+    const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
+    std::nth_element(around.begin(), middle, around.end());
+    floor.push_back(*middle);
   }
-  const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
-  std::nth_element(around.begin(), middle, around.end());
-  return *middle;
+  return floor;
 }
 
 /// A mean of M periodograms exceeds this multiple of its median about once in a million bins.
@@ -160,10 +165,11 @@ SpectralLine refine(std::span<const double> power, std::size_t bin, double bin_h
 
 std::vector<SpectralLine> peaks(const WelchSpectrum& spectrum, std::size_t channel, double bin_hz) {
   const auto power = spectrum.power(channel);
+  const std::vector<double> floor = noise_floor(power);
   std::vector<SpectralLine> found;
   for (std::size_t k = 4; k + 1 < power.size(); ++k) {  // below bin 4 is turbulence and the mean
     if (power[k] < power[k - 1] || power[k] <= power[k + 1]) continue;
-    const double noise = noise_around(power, k);
+    const double noise = floor[(k + kNoiseStep / 2) / kNoiseStep];
     if (power[k] <= threshold(spectrum.segments()) * noise || noise <= 0) continue;
     SpectralLine line = refine(power, k, bin_hz);
     line.prominence = power[k] / noise;

@@ -22,8 +22,8 @@ class Gatekeeper {
     add("correlation", std::abs(fit_.correlation) > limits_.correlation,
         "{:.5f}, must be above {:g} (thesis 4.2.1.1)", std::abs(fit_.correlation), limits_.correlation);
     const double residual = 100 * fit_.residual_std_N() / fit_.span_N();
-    add("residual scatter", residual <= limits_.residual_percent_of_span, "{:.2f} % of span, may be at most {:g} %",
-        residual, limits_.residual_percent_of_span);
+    add("residual scatter", residual <= limits_.residual_percent_of_span,
+        "{:.2f} % of span, may be at most {:g} %", residual, limits_.residual_percent_of_span);
     check_middle();
     check_shape();
     check_changes();

@@ -82,6 +82,14 @@ Json open_space_section(const Material& material) {
 Json budget_section(const Material& material) {
   if (!material.summary)
     return absent(fmt::format("There is no uncertainty budget: {}.", material.not_reduced));
+  const auto& locations = material.summary->locations;
+  if (std::none_of(locations.begin(), locations.end(),
+                   [](const LocationSummary& location) { return location.c_t.standard_uncertainty > 0; })) {
+    return absent(
+        "Nothing in the campaign says how uncertain its C_T is: no run was repeated, and there is no raw "
+        "data "
+        "and no calibration.");
+  }
   return Json::object();
 }
 

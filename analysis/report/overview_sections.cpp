@@ -29,12 +29,19 @@ void add_extremes_of_map(const DisturbanceMap& map, Json& json) {
       value_at(greatest->label, greatest->delta_ct_percent, greatest->delta_ct_u95_percent);
   json["least_delta_ct_percent"] =
       value_at(least->label, least->delta_ct_percent, least->delta_ct_u95_percent);
-  const auto uneven =
-      std::max_element(map.locations.begin(), map.locations.end(), [](const auto& a, const auto& b) {
-        return std::abs(a.uneven_thrust_percent) < std::abs(b.uneven_thrust_percent);
-      });
+}
+
+/// Of the tunnel's locations; of all where none is in a tunnel.
+void add_extreme_of_u(const Summary& summary, Json& json) {
+  const LocationSummary* greatest = nullptr;
+  const auto rank = [](const LocationSummary& location) {
+    return std::pair(location.y_norm.has_value(), std::abs(location.u_percent.mean));
+  };
+  for (const LocationSummary& location : summary.locations) {
+    if (greatest == nullptr || rank(*greatest) < rank(location)) greatest = &location;
+  }
   json["greatest_uneven_percent"] =
-      value_at(uneven->label, uneven->uneven_thrust_percent, uneven->uneven_thrust_u95_percent);
+      value_at(greatest->label, greatest->u_percent.mean, greatest->u_percent.u95);
 }
 
 }  // namespace
@@ -62,6 +69,7 @@ Json summary_section(const Material& material) {
       json["c_t"].push_back(value_at(location.label, location.c_t.mean, location.c_t.u95));
   }
   if (material.map) add_extremes_of_map(*material.map, json);
+  if (data.info.rig.rotors == kMaxRotors) add_extreme_of_u(*material.summary, json);
   return json;
 }
 
@@ -88,14 +96,15 @@ Json table_section(const ObservationTable& table, const TableReduction& reductio
             {"response_unit", table.schema.response.unit},
             {"convention", name_of(reduction.convention)},
             {"reduced", reduction.rows.size()},
-            {"left_out", reduction.left_out},
+            {"unknown", reduction.unknown},
+            {"at_rest", reduction.at_rest},
+            {"doubtful_lines", reduction.doubtful},
             {"groups", Json::array()}};
   for (const TableGroup& group : reduction.groups) {
-    Json columns{{"group", group.name},
-                 {"mean", group.mean},
-                 {"std", group.rows.size() > 1 ? Json(group.std) : Json(nullptr)}};
+    Json columns{{"group", group.name}, {"median", group.median}, {"spread", group.spread}};
     for (const std::size_t row : group.rows) {
-      columns["speed_rpm"].push_back(rounded(reduction.rows[row].speed_rpm, 1));
+      const bool has_speed = table.rows[reduction.rows[row].observation].speed_rpm.has_value();
+      columns["speed_rpm"].push_back(has_speed ? rounded(reduction.rows[row].speed_rpm, 1) : Json(nullptr));
       columns["c_t"].push_back(reduction.rows[row].c_t);
     }
     json["groups"].push_back(std::move(columns));

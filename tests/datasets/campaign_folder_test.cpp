@@ -123,6 +123,13 @@ TEST_F(Folder, OneCampaignPerFile) {
   EXPECT_EQ(CampaignFile(db, CampaignFile::Access::kRead).integrity_problems(), "");
 }
 
+TEST_F(Folder, WhatAKilledImportLeftIsSweptUp) {
+  campaign.write(source);
+  write_text(folder / "c.db.99999.part", "half a campaign");
+  import_campaign_folder(source, db, options());
+  EXPECT_FALSE(fs::exists(folder / "c.db.99999.part"));
+}
+
 TEST_F(Folder, AFailedReplacementLeavesTheOldCampaign) {
   campaign.write(source);
   import_campaign_folder(source, db, options());

@@ -1,25 +1,39 @@
-// The tunnel's columns against open space, a ground plane and a ceiling plane: the thesis's figures 5.24 and 5.57.
+// The tunnel's columns against open space, a ground plane and a ceiling plane: the thesis's figures 5.24
+// and 5.57.
 
-const planeNames = {ground: "GND, above a ground plane", ceiling: "CEIL, beneath a ceiling plane"};
+const planeNames = {
+  ground: 'GND, above a ground plane',
+  ceiling: 'CEIL, beneath a ceiling plane'
+};
 
 function planeTraces(section, byLabel, inTunnel) {
   return Object.entries(planeNames).flatMap(([side, name], i) => {
     const planes = section.planes.filter((p) => p.side === side).sort((a, b) => a.distance_R - b.distance_R);
     if (!planes.length) return [];
-    const trace = means(planes.map((p) => byLabel.get(p.location)), planes.map((p) => (inTunnel ? p.z_norm : p.distance_R)), "c_t", rotorColours()[2 * i],
-      {name, marker: {symbol: side === "ground" ? "triangle-down" : "triangle-up", size: 9}});
+    const trace = means(
+        planes.map((p) => byLabel.get(p.location)), planes.map((p) => (inTunnel ? p.z_norm : p.distance_R)),
+        'c_t', rotorColours()[2 * i],
+        {name, marker: {symbol: side === 'ground' ? 'triangle-down' : 'triangle-up', size: 9}});
     trace.text = trace.text.map((text, k) => `${text}<br>${fixed(planes[k].distance_R, 2)} R from the plane`);
-    return [{...trace, line: {...trace.line, dash: "dot"}}];
+    return [{...trace, line: {...trace.line, dash: 'dot'}}];
   });
 }
 
 /** Open space as a band of its U95, with a point of no size for the legend. */
 function openSpace(location) {
   const {mean, u95} = location.c_t;
-  const grey = style("--soft");
+  const grey = style('--soft');
   return {
     shapes: [band(mean - u95, mean + u95, grey, {opacity: 0.25}), rule(mean, grey)],
-    trace: {type: "scatter", mode: "lines", x: [null], y: [null], name: `OS, open space (${withU95(mean, u95)})`, line: {color: grey, width: 6}}};
+    trace: {
+      type: 'scatter',
+      mode: 'lines',
+      x: [null],
+      y: [null],
+      name: `OS, open space (${withU95(mean, u95)})`,
+      line: {color: grey, width: 6}
+    }
+  };
 }
 
 function drawAgainst(section, column, y) {
@@ -27,8 +41,10 @@ function drawAgainst(section, column, y) {
   const data = planeTraces(section, byLabel, column !== undefined);
   const shapes = [];
   if (column) {
-    const colour = style("--ink");
-    data.unshift(means(column.locations, column.locations.map((l) => l.z_norm), "c_t", colour, {name: `${plain(column.label)}, in the tunnel`}));
+    const colour = style('--ink');
+    data.unshift(means(
+        column.locations, column.locations.map((l) => l.z_norm), 'c_t', colour,
+        {name: `${plain(column.label)}, in the tunnel`}));
   }
   if (section.open_space) {
     const open = openSpace(byLabel.get(section.open_space));
@@ -36,39 +52,59 @@ function drawAgainst(section, column, y) {
     shapes.push(...open.shapes);
   }
   const range = [-1.15, 1.15];
-  return {data, layout: {
-    xaxis: column ? heightAxis({range}) : axis("distance of the rotors from the plane [R]"),
-    yaxis: axis("C<sub>T</sub>", {tickformat: ".4f", range: y}), shapes, legend: {orientation: "h", y: -0.2, yanchor: "top"}}};
+  return {
+    data,
+    layout: {
+      xaxis: column ? heightAxis({range}) : axis('distance of the rotors from the plane [R]'),
+      yaxis: axis('C<sub>T</sub>', {tickformat: '.4f', range: y}),
+      shapes,
+      legend: {orientation: 'h', y: -0.2, yanchor: 'top'}
+    }
+  };
 }
 
 /** One range of C_T for both pictures, so that they can be compared. */
 function commonRange(section, columns) {
-  const labels = new Set([section.open_space, ...section.planes.map((p) => p.location), ...columns.flatMap((c) => c.locations.map((l) => l.location))]);
-  const values = report.sections.locations.locations.filter((l) => labels.has(l.location)).flatMap(({c_t}) => [c_t.mean - c_t.u95, c_t.mean + c_t.u95]);
+  const labels = new Set([
+    section.open_space, ...section.planes.map((p) => p.location),
+    ...columns.flatMap((c) => c.locations.map((l) => l.location))
+  ]);
+  const values = report.sections.locations.locations.filter((l) => labels.has(l.location))
+                     .flatMap(({c_t}) => [c_t.mean - c_t.u95, c_t.mean + c_t.u95]);
   const [low, high] = [Math.min(...values), Math.max(...values)];
   return [low - 0.04 * (high - low), high + 0.04 * (high - low)];
 }
 
 function againstFigure(section, column, y) {
-  const title = column ? `${column.name ?? column.label} against open space` : "Ground and ceiling planes in open space";
-  const place = plot(`${title}; its numbers are in the table of locations`, (width) => (isNarrow(width) ? 520 : 480), () => drawAgainst(section, column, y));
+  const title = column ? `${column.name ?? column.label} against open space` :
+                         'Ground and ceiling planes in open space';
+  const place = plot(
+      `${title}; its numbers are in the table of locations`, (width) => (isNarrow(width) ? 520 : 480),
+      () => drawAgainst(section, column, y));
   const has = (side) => section.planes.some((p) => p.side === side);
-  const placed = column && section.planes.length
-    ? "A point above a ground plane (GND) or beneath a ceiling plane (CEIL) stands at the height in the tunnel that has the same distance from its " +
-      "floor or ceiling, z̄ = ∓(h_t − 2d)/(h_t − h_q) with d the distance; the rotors are taken to be at the vehicle's mid-height."
-    : section.planes.length ? "By the distance of the rotors from the plane; without a column of a tunnel there is no height to place them at." : "";
-  const missing = [section.open_space ? "" : "open space (OS)", has("ground") ? "" : "a ground plane (GND)", has("ceiling") ? "" : "a ceiling plane (CEIL)"].filter(Boolean);
-  return figure(title, [], place,
-    `${section.open_space ? "Grey band: C_T in open space with its U95. " : ""}${placed} Error bars: U95.` +
-    `${missing.length ? ` The campaign has no runs at ${missing.join(" and ")}.` : ""}`, command("reduce", "--csv coefficients.csv"));
+  const placed = column && section.planes.length ?
+      'A point above a ground plane (GND) or beneath a ceiling plane (CEIL) stands at the height in the tunnel that has the same distance from its ' +
+          'floor or ceiling, z̄ = ∓(h_t − 2d)/(h_t − h_q) with d the distance; the rotors are taken to be at the vehicle\'s mid-height.' :
+      section.planes.length ?
+      'By the distance of the rotors from the plane; without a column of a tunnel there is no height to place them at.' :
+      '';
+  const missing = [
+    section.open_space ? '' : 'open space (OS)', has('ground') ? '' : 'a ground plane (GND)',
+    has('ceiling') ? '' : 'a ceiling plane (CEIL)'
+  ].filter(Boolean);
+  return figure(
+      title, [], place,
+      `${section.open_space ? 'Grey band: C_T in open space with its U95. ' : ''}${placed} Error bars: U95.` +
+          `${missing.length ? ` The campaign has no runs at ${missing.join(' and ')}.` : ''}`,
+      command('reduce', '--csv coefficients.csv'));
 }
 
 function openSpaceSection(section) {
   const columns = section.tunnel ? columnsOf(report.sections.locations.locations) : [];
   if (!columns.length) return againstFigure(section, undefined);
   // The thesis shows H0 and H4; other grids their middle and their outermost column.
-  const outer = columns.find((c) => c.name === "H4") ?? columns.at(-1);
+  const outer = columns.find((c) => c.name === 'H4') ?? columns.at(-1);
   const chosen = outer === columns[0] ? [columns[0]] : [columns[0], outer];
   const y = commonRange(section, chosen);
-  return h("div", {class: "pair"}, chosen.map((column) => againstFigure(section, column, y)));
+  return h('div', {class: 'pair'}, chosen.map((column) => againstFigure(section, column, y)));
 }

@@ -1,5 +1,5 @@
-// Plots are drawn when they come near the window, the rest when the browser has nothing else to do: a page of a
-// thousand runs answers at once, and is whole when it is searched or printed.
+// Plots are drawn when they come near the window, the rest when the browser has nothing else to do: a page of
+// a thousand runs answers at once, and is whole when it is searched or printed.
 
 const plots = [];
 const errors = [];
@@ -14,20 +14,24 @@ function fail(error) {
   errors.push(String(error?.stack ?? error));
   tell();
 }
-addEventListener("error", (event) => fail(event.error ?? event.message));
-addEventListener("unhandledrejection", (event) => fail(event.reason));
+addEventListener('error', (event) => fail(event.error ?? event.message));
+addEventListener('unhandledrejection', (event) => fail(event.reason));
 
 // The buttons are named one by one: among Plotly's own is one that sends the data to its makers' server.
 const config = {
-  displaylogo: false, displayModeBar: matchMedia("(hover: hover)").matches ? "hover" : false,
-  modeBarButtons: [["toImage", "zoom2d", "pan2d", "autoScale2d", "resetScale2d"]], toImageButtonOptions: {format: "svg"}, plotlyServerURL: ""};
+  displaylogo: false,
+  displayModeBar: matchMedia('(hover: hover)').matches ? 'hover' : false,
+  modeBarButtons: [['toImage', 'zoom2d', 'pan2d', 'autoScale2d', 'resetScale2d']],
+  toImageButtonOptions: {format: 'svg'},
+  plotlyServerURL: ''
+};
 
 /**
- * A place for a plot. `build(width)` gives {data, layout}, anew for every width and theme; `height(width)` is in pixels.
- * `label` says what it shows to those who cannot see it.
+ * A place for a plot. `build(width)` gives {data, layout}, anew for every width and theme; `height(width)` is
+ * in pixels. `label` says what it shows to those who cannot see it.
  */
 function plot(label, height, build) {
-  const place = h("div", {class: "plot", role: "group", "aria-label": label});
+  const place = h('div', {class: 'plot', role: 'group', 'aria-label': label});
   plots.push({place, height, build, drawn: false});
   return place;
 }
@@ -40,7 +44,8 @@ async function draw(plot) {
   plot.drawn = true;
   const width = plot.place.clientWidth;
   const {data, layout} = plot.build(width);
-  await Plotly.react(plot.place, data, {...baseLayout(width), ...layout, width, height: plot.height(width)}, config);
+  await Plotly.react(
+      plot.place, data, {...baseLayout(width), ...layout, width, height: plot.height(width)}, config);
   tell();
 }
 
@@ -59,7 +64,7 @@ function drawWhenNear() {
       const plot = plots.find((p) => p.place === entry.target);
       if (!plot.drawn) draw(plot).catch(fail);
     }
-  }, {rootMargin: "400px"});
+  }, {rootMargin: '400px'});
   plots.forEach((plot) => near.observe(plot.place));
 }
 
@@ -72,8 +77,11 @@ function drawWhenIdle() {
 
 /** On paper everything is there, light, and as wide as a page. */
 function drawForPaper(onPaper) {
-  document.documentElement.classList.toggle("paper", onPaper);
-  if (onPaper) plots.forEach((plot) => { plot.drawn = true; });
+  document.documentElement.classList.toggle('paper', onPaper);
+  if (onPaper)
+    plots.forEach((plot) => {
+      plot.drawn = true;
+    });
   redrawAll();
 }
 
@@ -83,11 +91,15 @@ function startPlots() {
   drawWhenNear();
   setTimeout(drawWhenIdle, 200);
   let width = innerWidth, timer;
-  addEventListener("resize", () => {
+  addEventListener('resize', () => {
     clearTimeout(timer);
-    if (innerWidth !== width) timer = setTimeout(() => { width = innerWidth; redrawAll(); }, 150);
+    if (innerWidth !== width)
+      timer = setTimeout(() => {
+        width = innerWidth;
+        redrawAll();
+      }, 150);
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
-  addEventListener("beforeprint", () => drawForPaper(true));
-  addEventListener("afterprint", () => drawForPaper(false));
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redrawAll);
+  addEventListener('beforeprint', () => drawForPaper(true));
+  addEventListener('afterprint', () => drawForPaper(false));
 }

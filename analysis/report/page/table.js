@@ -3,69 +3,126 @@
 const kFew = 8;  // groups that get a colour each
 
 const sweepTrace = (group, colour, i) => ({
-  type: "scatter", mode: "lines+markers", name: plain(group.group), x: group.speed_rpm, y: group.c_t,
-  line: {color: colour, width: 1.6}, marker: {color: colour, size: 6, symbol: symbols[i % symbols.length]},
-  hovertemplate: "%{fullData.name}<br>%{x:.0f} rev/min<br>C<sub>T</sub> %{y:.5f}<extra></extra>"});
+  type: 'scatter',
+  mode: 'lines+markers',
+  name: plain(group.group),
+  x: group.speed_rpm,
+  y: group.c_t,
+  line: {color: colour, width: 1.6},
+  marker: {color: colour, size: 6, symbol: symbols[i % symbols.length]},
+  hovertemplate: '%{fullData.name}<br>%{x:.0f} rev/min<br>C<sub>T</sub> %{y:.5f}<extra></extra>'
+});
 
 /** All groups as one faint line, so that the chosen ones stand before them. */
 function backdrop(groups) {
   const join = (column) => groups.flatMap((group) => [...group[column], null]);
   return {
-    type: "scatter", mode: "lines", name: "all groups", x: join("speed_rpm"), y: join("c_t"), line: {color: style("--soft"), width: 0.7},
-    opacity: 0.4, hoverinfo: "skip"};
+    type: 'scatter',
+    mode: 'lines',
+    name: 'all groups',
+    x: join('speed_rpm'),
+    y: join('c_t'),
+    line: {color: style('--soft'), width: 0.7},
+    opacity: 0.4,
+    hoverinfo: 'skip'
+  };
 }
 
-/** From 0 to what all but one in a hundred rows say: a propeller that hardly turns has a coefficient of any size. */
+/** From 0 to what all but one in a hundred rows say, so that a few wild ones do not flatten the rest. */
 function usualRange(groups) {
   const values = groups.flatMap((g) => g.c_t).sort((a, b) => a - b);
   const quantile = (share) => values[Math.round(share * (values.length - 1))];
   return [Math.min(0, 1.1 * quantile(0.01)), 1.1 * quantile(0.99)];
 }
 
+/** What is not in the curves, and what in them is not to be believed. */
+function reservations({unknown, at_rest: atRest, doubtful_lines: doubtful}) {
+  const lines = doubtful.length > 6 ? `${doubtful.slice(0, 6).join(', ')} and ${doubtful.length - 6} more` :
+                                      doubtful.join(', ');
+  return (unknown ? ` ${counted(unknown, 'row')} left out, whose speed or diameter is not known.` : '') +
+      (atRest ?
+           ` ${
+               counted(
+                   atRest, 'row')} left out, whose motor stood (below 5 % of its group's highest speed).` :
+           '') +
+      (doubtful.length ? ` More than three times off their group's median, so in doubt: line ${lines}.` : '');
+}
+
 function drawSweeps(section, chosen) {
   const colours = [...rotorColours(), ...budgetColours().slice(4)];
   const shown = chosen.slice(0, kFew);
   const data = shown.map((k, i) => sweepTrace(section.groups[k], colours[i % colours.length], i));
-  return {data: section.groups.length > shown.length ? [backdrop(section.groups), ...data] : data, layout: {
-    xaxis: axis("speed [rev/min]"), yaxis: axis(`C<sub>T</sub> (${section.convention} convention)`, {range: usualRange(section.groups)}),
-    showlegend: true, legend: {orientation: "h", y: -0.2, yanchor: "top"}}};
+  return {
+    data: section.groups.length > shown.length ? [backdrop(section.groups), ...data] : data,
+    layout: {
+      xaxis: axis('speed [rev/min]'),
+      yaxis: axis(`C<sub>T</sub> (${section.convention} convention)`, {range: usualRange(section.groups)}),
+      showlegend: true,
+      legend: {orientation: 'h', y: -0.2, yanchor: 'top'}
+    }
+  };
 }
 
 /** Groups to choose from, with a field that narrows the list. */
 function groupPicker(groups, change) {
-  const select = h("select", {multiple: "", size: "8", "aria-label": "Groups to show", change: () => change([...select.selectedOptions].map((o) => Number(o.value)))});
-  const fill = (part) => select.replaceChildren(...groups.flatMap((g, i) =>
-    (g.group.toLowerCase().includes(part.toLowerCase()) ? [h("option", {value: i}, g.group)] : [])));
-  fill("");
+  const select = h('select', {
+    multiple: '',
+    size: '8',
+    'aria-label': 'Groups to show',
+    change: () => change([...select.selectedOptions].map((o) => Number(o.value)))
+  });
+  const fill = (part) => select.replaceChildren(...groups.flatMap(
+      (g, i) =>
+          (g.group.toLowerCase().includes(part.toLowerCase()) ? [h('option', {value: i}, g.group)] : [])));
+  fill('');
   for (const option of [...select.options].slice(0, Math.min(3, groups.length))) option.selected = true;
-  const filter = h("input", {type: "search", placeholder: "part of a name", input: () => fill(filter.value)});
-  return h("div", {class: "picker"}, h("label", {}, "Filter ", filter), select,
-    h("p", {class: "soft"}, `Choose up to ${kFew}: hold Ctrl (⌘) or Shift for more than one.`));
+  const filter = h('input', {type: 'search', placeholder: 'part of a name', input: () => fill(filter.value)});
+  return h(
+      'div', {class: 'picker'}, h('label', {}, 'Filter ', filter), select,
+      h('p', {class: 'soft'}, `Choose up to ${kFew}: hold Ctrl (⌘) or Shift for more than one.`));
 }
 
 function sweepFigure(section) {
   const {groups} = section;
   let chosen = groups.slice(0, 3).map((_, i) => i);
-  const place = plot("C_T against speed by group; the table beneath has a summary", (width) => (isNarrow(width) ? 460 : 500), () => drawSweeps(section, chosen));
-  const picker = groups.length > 1 ? groupPicker(groups, (now) => { chosen = now; redraw(place); }) : [];
-  return figure("Thrust coefficient against speed", [], h("div", {class: "with-picker"}, picker, place),
-    `C_T of one rotor, from the column ${section.response}${section.response.includes(section.response_unit) ? "" : ` [${section.response_unit}]`}, speed, diameter and air of each row, in the ${section.convention} ` +
-    "convention. Faint lines: all groups; one row in a hundred lies outside the picture (double-click to see all). A table carries no repeats of its own, so there are no error bars: the scatter along a curve is what is known." +
-    `${section.left_out ? ` ${counted(section.left_out, "row")} left out, whose speed or diameter is not known.` : ""}`, command("reduce", "--csv coefficients.csv"));
+  const place = plot(
+      'C_T against speed by group; the table beneath has a summary', (width) => (isNarrow(width) ? 460 : 500),
+      () => drawSweeps(section, chosen));
+  const picker = groups.length > 1 ? groupPicker(groups, (now) => {
+    chosen = now;
+    redraw(place);
+  }) : [];
+  return figure(
+      'Thrust coefficient against speed', [], h('div', {class: 'with-picker'}, picker, place),
+      `C_T of one rotor, from the column ${section.response}${
+          section.response.includes(section.response_unit) ?
+              '' :
+              ` [${section.response_unit}]`}, speed, diameter and air of each row, in the ${
+          section.convention} ` +
+          'convention. Faint lines: all groups; one row in a hundred lies outside the picture (double-click to see all). A table carries no repeats of its own, so there are no error bars: the scatter along a curve is what is known.' +
+          reservations(section),
+      command('reduce', '--csv coefficients.csv'));
 }
 
-const sweepTable = (groups) => table("C_T by group", [
-  {name: "group", cell: (g) => g.group, text: true},
-  {name: "rows", cell: (g) => String(g.c_t.length)},
-  {name: "speed from [rev/min]", cell: (g) => fixed(g.speed_rpm[0], 0)},
-  {name: "to", cell: (g) => fixed(g.speed_rpm.at(-1), 0)},
-  {name: "C_T mean", cell: (g) => fixed(g.mean, 5)},
-  {name: "std", cell: (g) => fixed(g.std, 5)},
-  {name: "at the lowest speed", cell: (g) => fixed(g.c_t[0], 5)},
-  {name: "at the highest", cell: (g) => fixed(g.c_t.at(-1), 5)},
-], groups);
+const sweepTable = (groups) => table(
+    'C_T by group',
+    [
+      {name: 'group', cell: (g) => g.group, text: true},
+      {name: 'rows', cell: (g) => String(g.c_t.length)},
+      {name: 'speed from [rev/min]', cell: (g) => fixed(g.speed_rpm[0], 0)},
+      {name: 'to', cell: (g) => fixed(g.speed_rpm.at(-1), 0)},
+      {name: 'C_T median', cell: (g) => fixed(g.median, 5)},
+      {name: 'spread', cell: (g) => fixed(g.spread, 5)},
+      {name: 'at the lowest speed', cell: (g) => fixed(g.c_t[0], 5)},
+      {name: 'at the highest', cell: (g) => fixed(g.c_t.at(-1), 5)},
+    ],
+    groups);
 
 function tableSection(section) {
   const speeds = section.groups.some((g) => g.speed_rpm.some(known));
-  return [speeds ? sweepFigure(section) : h("p", {class: "absent"}, "The table names no speed, so there is no curve."), sweepTable(section.groups)];
+  return [
+    speeds ? sweepFigure(section) :
+             h('p', {class: 'absent'}, 'The table names no speed, so there is no curve.'),
+    sweepTable(section.groups)
+  ];
 }

@@ -1,50 +1,67 @@
-// Opens report pages in headless Chromium, wide and narrow, light and dark, and looks for what is wrong with them.
+// Opens report pages in headless Chromium, wide and narrow, light and dark, uses their controls, and says
+// what is wrong.
 //
-//   node open_pages.mjs CHROMIUM PROFILE_FOLDER PAGE.html…        what is wrong, a line each; exit code 1 if anything is
-//   SCREENSHOTS=FOLDER node open_pages.mjs …                      also leaves a picture of each view there
+//   node open_pages.mjs CHROMIUM PROFILE_FOLDER PAGE.html…        what is wrong, a line each; exit code 1 if
+//   anything is SCREENSHOTS=FOLDER node open_pages.mjs …                      also leaves a picture of each
+//   view there
 //
 // Speaks the DevTools protocol over a pipe: no port, no packages.
-import {spawn} from "node:child_process";
-import {writeFileSync} from "node:fs";
-import {basename, join, resolve} from "node:path";
-import {pathToFileURL} from "node:url";
+import {spawn} from 'node:child_process';
+import {writeFileSync} from 'node:fs';
+import {basename, join, resolve} from 'node:path';
+import {pathToFileURL} from 'node:url';
 
 const [chromium, profile, ...pages] = process.argv.slice(2);
-const views = [1280, 400].flatMap((width) => ["light", "dark"].map((scheme) => ({width, scheme})));
+const views = [{width: 1280, scheme: 'light'}, {width: 400, scheme: 'dark'}];
 const patience_ms = 60_000;
 
 /** Chromium, and a way to call it: call(method, parameters, session) and listeners of events. */
 function start() {
-  const browser = spawn(chromium, ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync", `--user-data-dir=${profile}`,
-    "--remote-debugging-pipe"], {stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"]});
+  const browser = spawn(
+      chromium,
+      [
+        '--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+        '--disable-background-networking', '--disable-component-update', '--disable-sync',
+        `--user-data-dir=${profile}`, '--remote-debugging-pipe'
+      ],
+      {stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe']});
   const [, , , to, from] = browser.stdio;
   const waiting = new Map(), listeners = new Set();
-  let number = 0, text = "";
-  from.setEncoding("utf8");
-  from.on("data", (piece) => {
-    const messages = (text + piece).split("\0");
+  let number = 0, text = '';
+  from.setEncoding('utf8');
+  from.on('data', (piece) => {
+    const messages = (text + piece).split('\0');
     text = messages.pop();
     for (const message of messages.map((m) => JSON.parse(m))) {
-      if (message.id === undefined) for (const listen of listeners) listen(message);
-      else waiting.get(message.id)(message);
+      if (message.id === undefined)
+        for (const listen of listeners) listen(message);
+      else
+        waiting.get(message.id)(message);
     }
   });
   const call = (method, params = {}, sessionId = undefined) => new Promise((done, failed) => {
-    waiting.set(++number, (answer) => (answer.error ? failed(new Error(`${method}: ${answer.error.message}`)) : done(answer.result)));
+    waiting.set(
+        ++number,
+        (answer) =>
+            (answer.error ? failed(new Error(`${method}: ${answer.error.message}`)) : done(answer.result)));
     to.write(`${JSON.stringify({id: number, method, params, sessionId})}\0`);
   });
-  browser.on("error", (error) => { throw error; });
-  return {call, listeners, close: () => call("Browser.close").catch(() => browser.kill())};
+  browser.on('error', (error) => {
+    throw error;
+  });
+  return {call, listeners, close: () => call('Browser.close').catch(() => browser.kill())};
 }
 
 /** What the page said and asked for: complaints of the console, and every address. */
 function record(complaints, requests) {
   return ({method, params}) => {
-    if (method === "Runtime.exceptionThrown") complaints.push(params.exceptionDetails.exception?.description ?? params.exceptionDetails.text);
-    if (method === "Runtime.consoleAPICalled" && ["error", "warning", "assert"].includes(params.type)) complaints.push(`console: ${params.args.map((a) => a.value ?? a.description).join(" ")}`);
-    if (method === "Log.entryAdded" && params.entry.level === "error") complaints.push(`log: ${params.entry.text}`);
-    if (method === "Network.requestWillBeSent") requests.push(params.request.url);
+    if (method === 'Runtime.exceptionThrown')
+      complaints.push(params.exceptionDetails.exception?.description ?? params.exceptionDetails.text);
+    if (method === 'Runtime.consoleAPICalled' && ['error', 'warning', 'assert'].includes(params.type))
+      complaints.push(`console: ${params.args.map((a) => a.value ?? a.description).join(' ')}`);
+    if (method === 'Log.entryAdded' && params.entry.level === 'error')
+      complaints.push(`log: ${params.entry.text}`);
+    if (method === 'Network.requestWillBeSent') requests.push(params.request.url);
   };
 }
 
@@ -52,38 +69,52 @@ function record(complaints, requests) {
 async function whenDrawn(evaluate) {
   const until = Date.now() + patience_ms;
   for (;;) {
-    const status = JSON.parse((await evaluate("document.documentElement.dataset.report ?? 'null'")) ?? "null");
-    if ((status && (status.drawn === status.plots || status.errors.length > 0)) || Date.now() > until) return status;
+    const status =
+        JSON.parse((await evaluate('document.documentElement.dataset.report ?? \'null\'')) ?? 'null');
+    if ((status && (status.drawn === status.plots || status.errors.length > 0)) || Date.now() > until)
+      return status;
     await new Promise((later) => setTimeout(later, 50));
   }
 }
 
 async function look(browser, page, {width, scheme}) {
-  const {targetId} = await browser.call("Target.createTarget", {url: "about:blank"});
-  const {sessionId} = await browser.call("Target.attachToTarget", {targetId, flatten: true});
+  const {targetId} = await browser.call('Target.createTarget', {url: 'about:blank'});
+  const {sessionId} = await browser.call('Target.attachToTarget', {targetId, flatten: true});
   const call = (method, params) => browser.call(method, params, sessionId);
   const complaints = [], requests = [];
   const listen = record(complaints, requests);
   browser.listeners.add(listen);
-  for (const domain of ["Page", "Runtime", "Network", "Log"]) await call(`${domain}.enable`);
-  await call("Emulation.setDeviceMetricsOverride", {width, height: 900, deviceScaleFactor: 1, mobile: width < 600});
-  await call("Emulation.setEmulatedMedia", {features: [{name: "prefers-color-scheme", value: scheme}]});
+  for (const domain of ['Page', 'Runtime', 'Network', 'Log']) await call(`${domain}.enable`);
+  await call(
+      'Emulation.setDeviceMetricsOverride', {width, height: 900, deviceScaleFactor: 1, mobile: width < 600});
+  await call('Emulation.setEmulatedMedia', {features: [{name: 'prefers-color-scheme', value: scheme}]});
   const address = pathToFileURL(resolve(page)).href;
-  await call("Page.navigate", {url: address});
-  const evaluate = async (expression) => (await call("Runtime.evaluate", {expression, returnByValue: true})).result.value;
+  await call('Page.navigate', {url: address});
+  const evaluate = async (expression) =>
+      (await call('Runtime.evaluate', {expression, returnByValue: true, awaitPromise: true})).result.value;
   const status = await whenDrawn(evaluate);
-  if (!status) complaints.push("the page's scripts did not run");
-  else if (status.errors.length > 0) complaints.push(...status.errors);
-  else if (status.drawn !== status.plots) complaints.push(`${status.drawn} of ${status.plots} plots were drawn`);
+  if (!status)
+    complaints.push('the page\'s scripts did not run');
+  else if (status.errors.length > 0)
+    complaints.push(...status.errors);
+  else if (status.drawn !== status.plots)
+    complaints.push(`${status.drawn} of ${status.plots} plots were drawn`);
   complaints.push(...JSON.parse(await evaluate(findings)));
-  complaints.push(...requests.filter((url) => url !== address && !/^(data|blob):/.test(url)).map((url) => `asked for ${url}`));
   if (process.env.SCREENSHOTS) {
-    const height = await evaluate("document.documentElement.scrollHeight");
-    const {data} = await call("Page.captureScreenshot", {captureBeyondViewport: true, clip: {x: 0, y: 0, width, height, scale: 1}});
-    writeFileSync(join(process.env.SCREENSHOTS, `${basename(page, ".html")}-${width}-${scheme}.png`), Buffer.from(data, "base64"));
+    const height = await evaluate('document.documentElement.scrollHeight');
+    const {data} = await call(
+        'Page.captureScreenshot', {captureBeyondViewport: true, clip: {x: 0, y: 0, width, height, scale: 1}});
+    writeFileSync(
+        join(process.env.SCREENSHOTS, `${basename(page, '.html')}-${width}-${scheme}.png`),
+        Buffer.from(data, 'base64'));
   }
+  await evaluate(exercise);
+  complaints.push(
+      ...((await whenDrawn(evaluate))?.errors ?? []).filter((error) => !complaints.includes(error)));
+  complaints.push(...requests.filter((url) => url !== address && !/^(data|blob):/.test(url))
+                      .map((url) => `asked for ${url}`));
   browser.listeners.delete(listen);
-  await browser.call("Target.closeTarget", {targetId});
+  await browser.call('Target.closeTarget', {targetId});
   return {plots: status?.plots ?? 0, complaints};
 }
 
@@ -96,12 +127,20 @@ const findings = `JSON.stringify([
   ...(/undefined|NaN|\\[object/.test(document.body.innerText) ? ["a value that is none stands in the text"] : []),
 ])`;
 
+/** Run in the page: every control once, and a print. */
+const exercise = `
+  document.querySelectorAll("input[type=radio], input[type=checkbox]").forEach((input) => input.click());
+  document.querySelectorAll("details").forEach((details) => { details.open = true; });
+  for (const type of ["beforeprint", "afterprint"]) dispatchEvent(new Event(type));
+  new Promise((later) => setTimeout(later, 200))`;
+
 const browser = start();
 let wrong = 0;
 for (const page of pages) {
   for (const view of views) {
     const {plots, complaints} = await look(browser, page, view);
-    console.log(`${basename(page)} at ${view.width} pixels, ${view.scheme}: ${plots} plots, ${complaints.length === 0 ? "well" : "not well"}`);
+    console.log(`${basename(page)} at ${view.width} pixels, ${view.scheme}: ${plots} plots, ${
+        complaints.length === 0 ? 'well' : 'not well'}`);
     for (const complaint of complaints) console.log(`  ${complaint}`);
     wrong += complaints.length;
   }

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace tunnelrig::test {
+
+/// What a campaign of these tests has: everything, unless a test takes something away.
+struct CampaignParts {
+  bool raw_data = true;       // else the rows give thrusts
+  bool calibrated = true;     // where there are raw data
+  bool tunnel = true;         // else every location is in open space
+  bool open_space = true;     // OS, and both planes
+  bool tares = true;          // where there are raw data
+  int rotors = 4;             // fewer only without raw data
+  int columns = 3, rows = 5;  // of the tunnel's locations
+  std::string source;         // the runs' column `source`; empty: they have none
+  std::string odd_label;      // of one more location, without a place in the tunnel
+  int frames_lost = 0;        // of the first run
+  int repeats = 2;            // a session each
+};
+
+/// Writes a campaign of the thesis's field as a folder beside `db` and imports it. Seeded: the same each
+/// time.
+void make_campaign(const std::filesystem::path& db, const CampaignParts& parts = {});
+
+/// A table of two propellers at four speeds; its rows are worth a C_T where `with_thrust`.
+void make_table(const std::filesystem::path& db, bool with_thrust = true);
+
+}  // namespace tunnelrig::test

@@ -1,0 +1,70 @@
+// The pages in a real browser: every plot drawn, no complaint of the console, nothing asked for.
+#include "analysis/report/render.h"
+#include "analysis/report/report_data.h"
+#include "campaigns.h"
+#include "datasets/csv.h"
+#include "support/temporary_folder.h"
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+namespace tunnelrig {
+namespace {
+
+using test::CampaignParts;
+
+/// Standard output and error of a command, and its exit code.
+std::pair<std::string, int> output_of(const std::string& command) {
+  std::string output;
+  std::FILE* pipe = ::popen((command + " 2>&1").c_str(), "r");
+  std::array<char, 4096> piece{};
+  while (const auto n = std::fread(piece.data(), 1, piece.size(), pipe)) output.append(piece.data(), n);
+  const int status = ::pclose(pipe);
+  return {output, WIFEXITED(status) ? WEXITSTATUS(status) : -1};
+}
+
+bool has(const char* program) { return output_of(fmt::format("command -v {}", program)).second == 0; }
+
+struct Pages {
+  test::TemporaryFolder folder;
+  std::string names;
+
+  void add(const std::string& name) {
+    const CampaignFile file(folder / (name + ".db"), CampaignFile::Access::kRead);
+    const ReportData data =
+        report_data(file, {.db = name + ".db", .program_version = "0", .arguments = "tunnelrig report"});
+    write_text(folder / (name + ".html"), render_report(data.json));
+    names += fmt::format(" '{}'", (folder / (name + ".html")).string());
+  }
+  void campaign(const std::string& name, const CampaignParts& parts) {
+    test::make_campaign(folder / (name + ".db"), parts);
+    add(name);
+  }
+};
+
+TEST(ReportPage, OpensInABrowser) {
+  if (!has("chromium")) GTEST_SKIP() << "chromium is not installed, so no page was opened";
+  if (!has("node")) GTEST_SKIP() << "node is not installed, which drives the browser, so no page was opened";
+  Pages pages;
+  pages.campaign("whole", {.frames_lost = 3});
+  pages.campaign("hostile", {.columns = 1, .rows = 3, .source = "virtual", .odd_label = "</script><b>%{x}"});
+  pages.campaign("uncalibrated", {.calibrated = false});
+  pages.campaign("open_space_only", {.tunnel = false});
+  pages.campaign("one_rotor", {.raw_data = false, .rotors = 1});
+  pages.campaign("one_run", {.raw_data = false, .open_space = false, .columns = 1, .rows = 1, .repeats = 1});
+  test::make_table(pages.folder / "table.db");
+  pages.add("table");
+  test::make_table(pages.folder / "no_thrust.db", false);
+  pages.add("no_thrust");
+  const auto [output, code] = output_of(fmt::format("node '{}' chromium '{}'{}", TUNNELRIG_OPEN_PAGES,
+                                                    (pages.folder / "profile").string(), pages.names));
+  EXPECT_EQ(code, 0) << output;
+}
+
+}  // namespace
+}  // namespace tunnelrig
