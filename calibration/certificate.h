@@ -2,7 +2,6 @@
 // whether it can be trusted.
 #pragma once
 
-#include "calibration/crosstalk.h"
 #include "calibration/load_cell.h"
 #include "calibration/propellers.h"
 #include "datasets/campaign.h"
@@ -61,7 +60,6 @@ struct Certificate {
   CalibrationConditions conditions;
   std::vector<CellFit> cells;  // of rotor 1, 2, …
   PropellerFactors propellers;
-  std::optional<CrosstalkFit> crosstalk;
   std::vector<CalibrationGate> gates;
   std::vector<std::string> warnings;  // in plain words
   std::string points_hash;            // of the points and tests that it was made from

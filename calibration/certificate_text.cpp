@@ -159,26 +159,6 @@ std::string propeller_table(const PropellerFactors& propellers) {
   return text;
 }
 
-std::string crosstalk_table(const CrosstalkFit& fit) {
-  std::string text =
-      fmt::format("\nCrosstalk matrix, reading per N ({} rows, {} degrees of freedom)\n  {:>16}",
-                  fit.rows_used, fit.dof, "");
-  for (const std::string& axis : fit.axes) text += fmt::format(" {:>16}", axis);
-  for (Eigen::Index channel = 0; channel < fit.matrix.rows(); ++channel) {
-    text += fmt::format("\n  {:>16}", fit.channels[static_cast<std::size_t>(channel)]);
-    for (Eigen::Index axis = 0; axis < fit.matrix.cols(); ++axis) {
-      text += fmt::format(" {:>16.6g}", fit.matrix(channel, axis));
-    }
-  }
-  text += '\n';
-  for (const CrosstalkRow& row : fit.suspicious) {
-    text +=
-        fmt::format("  line {}: {} is {:+.3g} N off (studentised {:.1f}, p = {:.1g}){}\n", row.line,
-                    row.channel, row.residual_N, row.studentised, row.p, row.left_out ? "; left out" : "");
-  }
-  return text;
-}
-
 std::string heading(const Certificate& certificate) {
   const CalibrationConditions& conditions = certificate.conditions;
   const std::string warnings =
@@ -220,7 +200,6 @@ std::string format_certificate(const Certificate& certificate) {
     text += fmt::format("\n  FAILED: cell {}, {}: {}", gate.cell, gate.name, gate.finding);
   }
   text += untested(certificate) + point_table(certificate) + propeller_table(certificate.propellers);
-  if (certificate.crosstalk) text += crosstalk_table(*certificate.crosstalk);
   if (!certificate.warnings.empty()) text += "\nWarnings\n";
   for (const std::string& warning : certificate.warnings) text += fmt::format("  {}\n", warning);
   return text;

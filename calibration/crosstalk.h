@@ -92,4 +92,9 @@ struct CrosstalkFit {
 /// channels that do not tell the axes apart.
 CrosstalkFit fit_crosstalk(const CrosstalkTable& table, const CrosstalkOptions& options = {});
 
+/// The matrix as a table of text, with the rows that do not fit; JSON of everything; `indent` as nlohmann's
+/// dump.
+std::string format_crosstalk(const CrosstalkFit& fit);
+std::string to_json(const CrosstalkFit& fit, int indent = -1);
+
 }  // namespace tunnelrig

@@ -65,60 +65,6 @@ int calibrate_campaign(const Options& options) {
   return certificate.passed() ? kWell : kProblemFound;
 }
 
-nlohmann::ordered_json matrix_json(const Eigen::MatrixXd& matrix) {
-  auto rows = nlohmann::ordered_json::array();
-  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
-    rows.push_back(std::vector<double>(matrix.row(r).begin(), matrix.row(r).end()));
-  }
-  return rows;
-}
-
-nlohmann::ordered_json crosstalk_json(const CrosstalkFit& fit) {
-  nlohmann::ordered_json json{{"axes", fit.axes},
-                              {"channels", fit.channels},
-                              {"matrix_per_N", matrix_json(fit.matrix)},
-                              {"even_per_N", matrix_json(fit.even)},
-                              {"rows_used", fit.rows_used},
-                              {"dof", fit.dof}};
-  json["suspicious"] = nlohmann::ordered_json::array();
-  for (const CrosstalkRow& row : fit.suspicious) {
-    json["suspicious"].push_back({{"line", row.line},
-                                  {"channel", row.channel},
-                                  {"residual_N", row.residual_N},
-                                  {"studentised", row.studentised},
-                                  {"p", row.p},
-                                  {"gross", row.gross},
-                                  {"left_out", row.left_out}});
-  }
-  return json;
-}
-
-void print_crosstalk(const CrosstalkFit& fit, const std::string& file) {
-  fmt::print("{}: {} rows, {} degrees of freedom. Readings per newton of load on each axis:\n\n", file,
-             fit.rows_used, fit.dof);
-  std::vector<std::string> headers = {"channel"};
-  headers.insert(headers.end(), fit.axes.begin(), fit.axes.end());
-  const bool both_signs = !fit.even.isZero();
-  for (const std::string& axis : fit.axes) {
-    if (both_signs) headers.push_back("even " + axis);
-  }
-  Table table(headers);
-  for (Eigen::Index r = 0; r < fit.matrix.rows(); ++r) {
-    std::vector<std::string> cells = {fit.channels[static_cast<std::size_t>(r)]};
-    for (Eigen::Index c = 0; c < fit.matrix.cols(); ++c)
-      cells.push_back(fmt::format("{:.6g}", fit.matrix(r, c)));
-    for (Eigen::Index c = 0; both_signs && c < fit.even.cols(); ++c)
-      cells.push_back(fmt::format("{:.6g}", fit.even(r, c)));
-    table.add(cells);
-  }
-  table.print();
-  for (const CrosstalkRow& row : fit.suspicious) {
-    warn(fmt::format("{}:{}: {} is {:.3f} N off (studentised {:.1f}, p {:.2g}){}", file, row.line,
-                     row.channel, row.residual_N, row.studentised, row.p,
-                     row.left_out ? "; left out of the fit" : ""));
-  }
-}
-
 int calibrate_matrix(const Options& options) {
   if (options.forces.empty() || options.forces.size() != options.readings.size()) {
     throw InputError("--matrix: --forces and --readings name the columns of as many axes as channels");
@@ -131,9 +77,13 @@ int calibrate_matrix(const Options& options) {
                      .shape = options.diagonal ? MatrixShape::kDiagonal : MatrixShape::kFull,
                      .leave_out_gross = !options.keep_gross});
   if (options.json) {
-    fmt::print("{}\n", crosstalk_json(fit).dump(1));
+    fmt::print("{}\n", to_json(fit, 1));
   } else {
-    print_crosstalk(fit, options.matrix);
+    fmt::print("{}: {}", options.matrix, format_crosstalk(fit));
+  }
+  for (const CrosstalkRow& row : fit.suspicious) {
+    warn(fmt::format("{}:{}: this row does not fit the others ({}, p = {:.1g}){}", options.matrix, row.line,
+                     row.channel, row.p, row.left_out ? "; it is left out" : ""));
   }
   return fit.suspicious.empty() ? kWell : kProblemFound;
 }

@@ -1,0 +1,114 @@
+#include "analysis/health.h"
+
+#include "analysis/run_summary.h"
+#include "datasets/campaign_folder.h"
+#include "datasets/sqlite.h"
+#include "support/example_campaign.h"
+#include "support/temporary_folder.h"
+
+#include <algorithm>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using testing::HasSubstr;
+
+struct Health : testing::Test {
+  test::TemporaryFolder folder;
+  test::ExampleCampaign campaign;
+
+  void import(bool allow_stuck = false) {
+    campaign.write(folder / "source");
+    read(allow_stuck);
+  }
+  void read(bool allow_stuck = false) {
+    ImportOptions options{.replace = true, .allow_stuck = allow_stuck};
+    options.summarizer = [](const CampaignInfo& info, const RawFormat& format) {
+      return make_run_summarizer(info, format);
+    };
+    import_campaign_folder(folder / "source", folder / "c.db", options);
+  }
+  void calibrate_file() const {
+    CampaignFile file(folder / "c.db", CampaignFile::Access::kWrite);
+    file.add_document("calibration", {"", "", "{}"},
+                      to_json(calibrate(file.calibration_points(), file.propeller_tests())));
+  }
+  std::vector<Finding> findings() const {
+    const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+    return examine(file, read_campaign_data(file), {});
+  }
+  /// What is found of a severity, all in one text.
+  std::string found(Severity severity) const {
+    std::string text;
+    for (const Finding& finding : findings()) {
+      if (finding.severity == severity) text += finding.check + ": " + finding.found + "\n";
+    }
+    return text;
+  }
+};
+
+TEST_F(Health, OfASoundCampaign) {
+  import();
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("calibration: none, so no run can be reduced"));
+  calibrate_file();
+  EXPECT_EQ(found(Severity::kProblem), "");
+  EXPECT_THAT(found(Severity::kNote), HasSubstr("tares: none in S1, S2"));
+  for (const Finding& finding : findings())
+    EXPECT_TRUE(finding.severity == Severity::kGood || !finding.advice.empty()) << finding.found;
+}
+
+TEST_F(Health, StuckAndClippedChannels) {
+  campaign.write(folder / "source");
+  auto stuck = test::example_frames(400, 1);
+  for (std::size_t i = 0; i < 400; ++i) {
+    stuck[i * 8 + 4] = stuck[i * 8 + 5] = std::byte{3};
+    stuck[i * 8] = std::byte{0xFF};
+    stuck[i * 8 + 1] = std::byte{static_cast<unsigned char>(i % 2 == 0 ? 0x0F : 0x0E)};
+  }
+  test::write_npy(folder / "source/raw/R2.npy", {}, 400, stuck);
+  read(true);
+  calibrate_file();
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("stuck, never change: R2 channel 3"));
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("clipped: R2 channel 1 (50 %)"));
+}
+
+TEST_F(Health, MissingTemperatureAndOffSpeed) {
+  const auto at = campaign.runs_csv.find(",20.5");
+  campaign.runs_csv.replace(at, 5, ",");
+  const auto speed = campaign.runs_csv.find("4999.0");
+  campaign.runs_csv.replace(speed, 6, "4900.0");
+  import();
+  calibrate_file();
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("air_temperature_C is missing in R1"));
+  EXPECT_THAT(found(Severity::kNote), HasSubstr("R2 (4900)"));
+}
+
+TEST_F(Health, DamagedAndChangedRawData) {
+  import();
+  calibrate_file();
+  Database((folder / "c.db").string(), SQLITE_OPEN_READWRITE)
+      .execute("UPDATE raw_chunks SET data = zeroblob(length(data)) WHERE id = (1 << 32)");
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("raw data: damaged blobs in R1"));
+}
+
+TEST_F(Health, AnOldCertificateAndAnOpenLedger) {
+  import();
+  calibrate_file();
+  {
+    CampaignFile file(folder / "c.db", CampaignFile::Access::kWrite);
+    Sheet points = file.sheet("calibration").value();
+    points.rows.pop_back();
+    file.set_sheet("calibration", points);
+    file.database().execute(
+        "INSERT INTO ledgers VALUES (1, 500, 400, 50, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, NULL, 'complete', "
+        "'tcp:x')");
+  }
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("calibration: made from other points"));
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("loss ledger: emitted is not stored plus lost in R1"));
+}
+
+}  // namespace
+}  // namespace tunnelrig

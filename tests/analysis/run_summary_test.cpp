@@ -1,0 +1,224 @@
+#include "analysis/run_summary.h"
+
+#include "analysis/autocorrelation.h"
+#include "support/example_campaign.h"
+#include "support/seeds.h"
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+const CampaignInfo kCampaign = parse_campaign_toml(reference_campaign_toml(), "campaign.toml");
+const double kRate_hz = kCampaign.daq.sample_rate_hz;
+
+/// Samples of four channels as doubles of volts.
+std::vector<std::byte> volts(std::size_t frames,
+                             const std::function<double(std::size_t frame, std::size_t channel)>& signal) {
+  std::vector<double> samples;
+  samples.reserve(frames * 4);
+  for (std::size_t i = 0; i < frames; ++i) {
+    for (std::size_t c = 0; c < 4; ++c) samples.push_back(signal(i, c));
+  }
+  std::vector<std::byte> bytes(samples.size() * sizeof(double));
+  std::memcpy(bytes.data(), samples.data(), bytes.size());
+  return bytes;
+}
+
+RunStatistics summarize(const std::vector<std::byte>& data, const RawFormat& format, std::size_t piece = 0) {
+  const auto summarizer = make_run_summarizer(kCampaign, format);
+  const std::size_t step = piece == 0 ? data.size() : piece * format.frame_size();
+  for (std::size_t at = 0; at < data.size(); at += step) {
+    summarizer->frames(std::span(data).subspan(at, std::min(step, data.size() - at)));
+  }
+  return summarizer->finish("hash");
+}
+
+TEST(RunSummary, ExactSumsWhateverThePieces) {
+  for (const SampleType type :
+       {SampleType::kInt16, SampleType::kUInt16, SampleType::kFloat32, SampleType::kFloat64}) {
+    const RawFormat format{type, 4};
+    const auto data = test::example_frames(5000, 3, format);
+    const RunStatistics whole = summarize(data, format);
+    const double scale = is_counts(type) ? kCampaign.daq.volts_per_count() : 1;
+    for (std::size_t c = 0; c < 4; ++c) {
+      double sum = 0, square = 0;
+      for (std::size_t i = 0; i < 5000; ++i) {
+        double value = 0;
+        const std::byte* at = data.data() + (i * 4 + c) * sample_size(type);
+        if (type == SampleType::kInt16 || type == SampleType::kUInt16) {
+          std::uint16_t counts = 0;
+          std::memcpy(&counts, at, 2);
+          value = counts;
+        } else if (type == SampleType::kFloat32) {
+          float single = 0;
+          std::memcpy(&single, at, 4);
+          value = static_cast<double>(single);
+        } else {
+          std::memcpy(&value, at, 8);
+        }
+        sum += value * scale;
+        square += value * scale * value * scale;
+      }
+      const double mean = sum / 5000;
+      EXPECT_NEAR(whole.channels[c].mean_V, mean, 1e-12);
+      EXPECT_NEAR(whole.channels[c].std_V, std::sqrt(square / 5000 - mean * mean), 1e-9);
+    }
+    for (const std::size_t piece : {1u, 66u, 133u, 4096u}) {
+      const RunStatistics cut = summarize(data, format, piece);
+      for (std::size_t c = 0; c < 4; ++c) {
+        EXPECT_EQ(cut.channels[c].mean_V, whole.channels[c].mean_V);
+        EXPECT_EQ(cut.channels[c].standard_error_V, whole.channels[c].standard_error_V);
+      }
+      EXPECT_EQ(cut.window_means_V, whole.window_means_V);
+    }
+  }
+}
+
+TEST(RunSummary, ExtremesAndClipping) {
+  std::vector<std::byte> data = test::example_frames(1000, 1);
+  const std::int16_t top = 4095, bottom = 0;
+  std::memcpy(data.data() + 500 * 8, &top, 2);
+  std::memcpy(data.data() + 501 * 8, &bottom, 2);
+  const RunStatistics statistics = summarize(data, {});
+  EXPECT_EQ(statistics.channels[0].clipped, 2u);
+  EXPECT_EQ(statistics.channels[1].clipped, 0u);
+  EXPECT_EQ(statistics.channels[0].lowest_V, 0);
+  EXPECT_NEAR(statistics.channels[0].highest_V, 4095 * 3.3 / 4096, 1e-12);
+  EXPECT_FALSE(statistics.channels[0].stuck());
+  EXPECT_TRUE(
+      summarize(volts(100, [](auto, auto) { return 1.5; }), {SampleType::kFloat64, 4}).channels[2].stuck());
+}
+
+/// Turbulence of 80 ms in 60 s: the standard error must be the scatter of the mean over many runs, not that
+/// of independent samples.
+TEST(RunSummary, StandardErrorRespectsAutocorrelation) {
+  const std::uint64_t seed = test::seed();
+  SCOPED_TRACE(seed);
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<double> unit;
+  const std::size_t frames = 8000;
+  const double decay = std::exp(-1 / (0.08 * kRate_hz));
+  std::vector<double> means, errors;
+  for (int run = 0; run < 150; ++run) {
+    std::array<double, 4> state{};
+    for (double& value : state) value = 0.1 * unit(engine);
+    const RunStatistics statistics =
+        summarize(volts(frames,
+                        [&](std::size_t, std::size_t c) {
+                          state[c] = decay * state[c] + 0.1 * std::sqrt(1 - decay * decay) * unit(engine);
+                          return 2 + state[c];
+                        }),
+                  {SampleType::kFloat64, 4});
+    for (const ChannelStatistics& channel : statistics.channels) {
+      means.push_back(channel.mean_V);
+      errors.push_back(channel.standard_error_V);
+    }
+  }
+  double square = 0, claimed = 0;
+  for (std::size_t i = 0; i < means.size(); ++i) {
+    square += (means[i] - 2) * (means[i] - 2) / static_cast<double>(means.size());
+    claimed += errors[i] * errors[i] / static_cast<double>(means.size());
+  }
+  EXPECT_NEAR(std::sqrt(claimed / square), 1, 0.12);
+  EXPECT_GT(std::sqrt(claimed), 5 * 0.1 / std::sqrt(8000)) << "8000 samples are not 8000 independent ones";
+}
+
+TEST(RunSummary, IndependentValuesGiveTheTextbookError) {
+  std::mt19937_64 engine(5);
+  std::normal_distribution<double> unit;
+  double ratio = 0;
+  for (int i = 0; i < 200; ++i) {
+    std::vector<double> series(200);
+    for (double& value : series) value = unit(engine);
+    ratio += variance_of_mean(series) * 200 / 200;
+  }
+  EXPECT_NEAR(ratio, 1, 0.15);
+}
+
+TEST(RunSummary, DriftIsSeenAndNoiseIsNot) {
+  std::mt19937_64 engine(7);
+  std::normal_distribution<double> unit;
+  const RunStatistics statistics =
+      summarize(volts(8000,
+                      [&](std::size_t i, std::size_t c) {
+                        return 2 + 0.01 * unit(engine) + (c == 1 ? 0.02 * static_cast<double>(i) / 8000 : 0);
+                      }),
+                {SampleType::kFloat64, 4});
+  EXPECT_TRUE(statistics.channels[0].stationary());
+  EXPECT_FALSE(statistics.channels[1].stationary());
+  EXPECT_NEAR(statistics.channels[1].drift_V, 0.02, 0.002);
+}
+
+TEST(RunSummary, LinesAreFoundNamedAndMeasured) {
+  std::mt19937_64 engine(9);
+  std::normal_distribution<double> unit;
+  const double shaft_hz = 83.71;
+  const auto wave = [](double frequency, std::size_t i) {
+    return std::sin(2 * std::numbers::pi * frequency * static_cast<double>(i) / kRate_hz);
+  };
+  const RunStatistics statistics = summarize(
+      volts(80000,
+            [&](std::size_t i, std::size_t) {
+              return 2 + 0.02 * unit(engine) + 0.1 * wave(shaft_hz, i) + 0.04 * wave(2 * shaft_hz, i) +
+                     0.01 * wave(50, i) + 0.02 * wave(9 * shaft_hz, i);
+            }),
+      {SampleType::kFloat64, 4});
+  const ChannelStatistics& channel = statistics.channels[0];
+  ASSERT_TRUE(channel.shaft_hz.has_value());
+  EXPECT_NEAR(*channel.shaft_hz, shaft_hz, 0.01) << "a second tachometer, to 0.6 rev/min";
+  std::map<std::string, SpectralLine> lines;
+  for (const SpectralLine& line : channel.lines) lines[line.name] = line;
+  EXPECT_NEAR(lines["shaft"].amplitude_V, 0.1, 0.003);
+  EXPECT_NEAR(lines["blade_pass"].amplitude_V, 0.04, 0.002);
+  EXPECT_NEAR(lines["mains_50"].amplitude_V, 0.01, 0.001);
+  ASSERT_TRUE(lines.contains("shaft_x9_alias")) << "753 Hz folds to 580 Hz";
+  EXPECT_NEAR(lines["shaft_x9_alias"].frequency_hz, kRate_hz - 9 * shaft_hz, 0.05);
+}
+
+TEST(RunSummary, NoiseHasNoLines) {
+  std::mt19937_64 engine(11);
+  std::normal_distribution<double> unit;
+  int lines = 0;
+  for (int run = 0; run < 10; ++run) {
+    const RunStatistics statistics = summarize(
+        volts(20000, [&](std::size_t, std::size_t) { return unit(engine); }), {SampleType::kFloat64, 4});
+    for (const ChannelStatistics& channel : statistics.channels)
+      lines += static_cast<int>(channel.lines.size());
+  }
+  EXPECT_LE(lines, 2) << "of 80,000 bins";
+}
+
+TEST(RunSummary, ShortRunsAndOneChannel) {
+  const RawFormat one{SampleType::kInt16, 1};
+  std::vector<std::byte> data(2 * 300);
+  for (std::size_t i = 0; i < 300; ++i) data[2 * i] = static_cast<std::byte>(i % 7);
+  EXPECT_EQ(summarize(data, one).channels.size(), 1u);
+  EXPECT_EQ(summarize({}, {}).frames, 0u);
+  EXPECT_EQ(summarize(test::example_frames(3, 1), {}).frames, 3u);
+}
+
+TEST(RunSummary, GapsMoveTimeOn) {
+  const auto data = test::example_frames(670, 1);  // two windows of 335 frames
+  const auto summarizer = make_run_summarizer(kCampaign, {});
+  summarizer->frames(std::span(data).first(335 * 8));
+  summarizer->gap({.first_frame = 335, .frames_lost = 670});
+  summarizer->frames(std::span(data).subspan(335 * 8));
+  const RunStatistics statistics = summarizer->finish("");
+  ASSERT_EQ(statistics.window_means_V.size(), 4u * 4);
+  EXPECT_FALSE(std::isnan(statistics.window_means_V[0]));
+  EXPECT_TRUE(std::isnan(statistics.window_means_V[4])) << "everything in this window was lost";
+  EXPECT_TRUE(std::isnan(statistics.window_means_V[8]));
+  EXPECT_FALSE(std::isnan(statistics.window_means_V[12]));
+  EXPECT_EQ(statistics.frames, 670u);
+}
+
+}  // namespace
+}  // namespace tunnelrig
