@@ -83,12 +83,14 @@ std::string plot_script(const TableReduction& reduction, const std::string& term
                         const std::string& output) {
   constexpr std::size_t kLegendGroups = 8;
   const bool legend = reduction.groups.size() <= kLegendGroups;
+  const bool pulls = std::any_of(reduction.rows.begin(), reduction.rows.end(),
+                                 [](const TableRow& row) { return row.c_t < 0; });
   std::string script = fmt::format(
       "set terminal {}\nset output {}\nset encoding utf8\nset xlabel 'speed [rev/min]'\n"
       "set ylabel 'C_T ({} convention)'\nset title {} noenhanced\nset grid lc rgb '#dddddd'\n{}\nset yrange "
-      "[0:*]\nplot ",
+      "[{}:*]\nplot ",
       terminal, quoted(output), name_of(reduction.convention), quoted(reduction.name),
-      legend ? "set key outside right noenhanced" : "unset key");
+      legend ? "set key outside right noenhanced" : "unset key", pulls ? "*" : "0");
   std::string data;
   for (std::size_t g = 0; g < reduction.groups.size(); ++g) {
     script +=

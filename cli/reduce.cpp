@@ -5,6 +5,7 @@
 #include "datasets/error.h"
 #include "datasets/statistics_store.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -149,6 +150,12 @@ int reduce_table(const Options& options, const CampaignFile& file) {
         fmt::format("{} rows have a C_T more than three times off their group's median; first in line {}: is "
                     "the speed right?",
                     reduction.doubtful.size(), reduction.doubtful.front()));
+  }
+  const auto pulls = std::count_if(reduction.groups.begin(), reduction.groups.end(),
+                                   [](const TableGroup& group) { return group.median < 0; });
+  if (pulls > 0) {
+    warn(fmt::format("{} groups have a negative C_T: their propeller pulled on the stand the other way",
+                     pulls));
   }
   if (reduction.unknown > 0) {
     warn(fmt::format("{} rows are left out: their speed or propeller diameter is not known",

@@ -32,10 +32,10 @@ void check(const PlanSettings& settings) {
   if (!(settings.duration_s > 0)) throw InputError("--duration: seconds, above 0");
 }
 
-/// Deals every location's visits out to as many different sessions, each time the emptiest ones, ties by chance; so
-/// sessions fill evenly and hang together through many pairs of locations.
-std::vector<std::vector<Visit>> assign_visits(std::vector<PlannedLocation> locations, const PlanSettings& settings,
-                                              std::mt19937_64& engine) {
+/// Deals every location's visits out to as many different sessions, each time the emptiest ones, ties by
+/// chance; so sessions fill evenly and hang together through many pairs of locations.
+std::vector<std::vector<Visit>> assign_visits(std::vector<PlannedLocation> locations,
+                                              const PlanSettings& settings, std::mt19937_64& engine) {
   const auto visits = static_cast<std::size_t>(settings.visits);
   const std::size_t runs = locations.size() * static_cast<std::size_t>(settings.repeats);
   const auto per_session = static_cast<std::size_t>(settings.runs_per_session);

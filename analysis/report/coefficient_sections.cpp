@@ -71,11 +71,17 @@ Json open_space_section(const Material& material) {
          {"distance_R", place->distance_R},
          {"z_norm", tunnel ? Json(z_norm_of(*place, material.data.info)) : Json(nullptr)}});
   }
-  if (json["open_space"].is_null() && json["planes"].empty()) {
+  const auto& locations = material.summary->locations;
+  const bool has_tunnel =
+      std::any_of(locations.begin(), locations.end(),
+                  [](const LocationSummary& location) { return location.y_norm.has_value(); });
+  if (json["planes"].empty() && json["open_space"].is_null()) {
     return absent(
         "The campaign has no runs in open space (OS), above a ground plane (GND) or beneath a ceiling plane "
         "(CEIL), so there is nothing to hold the tunnel against.");
   }
+  if (json["planes"].empty() && !has_tunnel)
+    return absent("The campaign has no runs in a tunnel or near a plane to hold against open space (OS).");
   return json;
 }
 

@@ -67,47 +67,46 @@ typedef struct {
 
 /* What trw_parse found at the start of a byte string. */
 typedef enum {
-  TRW_OK = 0,       /* a whole, valid packet */
-  TRW_NEED_MORE,    /* a valid beginning; more bytes are needed to decide */
-  TRW_BAD_SYNC,     /* no packet starts here */
-  TRW_BAD_HEADER,   /* sync word, but another version, type, or an impossible count */
-  TRW_BAD_CRC       /* a whole packet whose checksum is wrong */
+  TRW_OK = 0,     /* a whole, valid packet */
+  TRW_NEED_MORE,  /* a valid beginning; more bytes are needed to decide */
+  TRW_BAD_SYNC,   /* no packet starts here */
+  TRW_BAD_HEADER, /* sync word, but another version, type, or an impossible count */
+  TRW_BAD_CRC     /* a whole packet whose checksum is wrong */
 } trw_result;
 
-static inline void trw_put16(uint8_t *p, uint16_t v) {
+static inline void trw_put16(uint8_t* p, uint16_t v) {
   p[0] = (uint8_t)v;
   p[1] = (uint8_t)(v >> 8);
 }
 
-static inline void trw_put32(uint8_t *p, uint32_t v) {
+static inline void trw_put32(uint8_t* p, uint32_t v) {
   trw_put16(p, (uint16_t)v);
   trw_put16(p + 2, (uint16_t)(v >> 16));
 }
 
-static inline void trw_put64(uint8_t *p, uint64_t v) {
+static inline void trw_put64(uint8_t* p, uint64_t v) {
   trw_put32(p, (uint32_t)v);
   trw_put32(p + 4, (uint32_t)(v >> 32));
 }
 
-static inline uint16_t trw_get16(const uint8_t *p) {
+static inline uint16_t trw_get16(const uint8_t* p) {
   return (uint16_t)((uint32_t)p[0] | ((uint32_t)p[1] << 8));
 }
 
-static inline uint32_t trw_get32(const uint8_t *p) {
+static inline uint32_t trw_get32(const uint8_t* p) {
   return (uint32_t)trw_get16(p) | ((uint32_t)trw_get16(p + 2) << 16);
 }
 
-static inline uint64_t trw_get64(const uint8_t *p) {
+static inline uint64_t trw_get64(const uint8_t* p) {
   return (uint64_t)trw_get32(p) | ((uint64_t)trw_get32(p + 4) << 32);
 }
 
 /* CRC-32C (Castagnoli, reflected 0x82F63B78, start and final xor of all ones), as in iSCSI, RFC 3720 B.4.
  * Four bits at a time: 64 bytes of table suit the board. `crc` is 0 for the first piece of a message. */
-static inline uint32_t trw_crc32c(uint32_t crc, const uint8_t *data, size_t size) {
+static inline uint32_t trw_crc32c(uint32_t crc, const uint8_t* data, size_t size) {
   static const uint32_t table[16] = {
-      0x00000000u, 0x105EC76Fu, 0x20BD8EDEu, 0x30E349B1u, 0x417B1DBCu, 0x5125DAD3u,
-      0x61C69362u, 0x7198540Du, 0x82F63B78u, 0x92A8FC17u, 0xA24BB5A6u, 0xB21572C9u,
-      0xC38D26C4u, 0xD3D3E1ABu, 0xE330A81Au, 0xF36E6F75u};
+      0x00000000u, 0x105EC76Fu, 0x20BD8EDEu, 0x30E349B1u, 0x417B1DBCu, 0x5125DAD3u, 0x61C69362u, 0x7198540Du,
+      0x82F63B78u, 0x92A8FC17u, 0xA24BB5A6u, 0xB21572C9u, 0xC38D26C4u, 0xD3D3E1ABu, 0xE330A81Au, 0xF36E6F75u};
   crc = ~crc;
   for (size_t i = 0; i < size; ++i) {
     crc ^= data[i];
@@ -118,11 +117,10 @@ static inline uint32_t trw_crc32c(uint32_t crc, const uint8_t *data, size_t size
 }
 
 static inline size_t trw_packet_size(uint8_t frame_count) {
-  return (size_t)TRW_HEADER_SIZE + (size_t)frame_count * (size_t)TRW_FRAME_SIZE +
-         (size_t)TRW_CRC_SIZE;
+  return (size_t)TRW_HEADER_SIZE + (size_t)frame_count * (size_t)TRW_FRAME_SIZE + (size_t)TRW_CRC_SIZE;
 }
 
-static inline void trw_put_header(uint8_t *out, const trw_header *header) {
+static inline void trw_put_header(uint8_t* out, const trw_header* header) {
   out[0] = 0x54u;
   out[1] = 0x52u;
   out[2] = 0x57u;
@@ -139,14 +137,14 @@ static inline void trw_put_header(uint8_t *out, const trw_header *header) {
   trw_put32(out + 36, header->overruns);
 }
 
-static inline void trw_put_frame(uint8_t *out, const trw_frame *frame) {
+static inline void trw_put_frame(uint8_t* out, const trw_frame* frame) {
   for (size_t c = 0; c < (size_t)TRW_CHANNELS; ++c) {
     trw_put16(out + 2 * c, (uint16_t)frame->sample[c]);
   }
   trw_put16(out + 2 * (size_t)TRW_CHANNELS, frame->status);
 }
 
-static inline void trw_get_frame(const uint8_t *in, trw_frame *frame) {
+static inline void trw_get_frame(const uint8_t* in, trw_frame* frame) {
   for (size_t c = 0; c < (size_t)TRW_CHANNELS; ++c) {
     frame->sample[c] = (int16_t)trw_get16(in + 2 * c);
   }
@@ -154,7 +152,7 @@ static inline void trw_get_frame(const uint8_t *in, trw_frame *frame) {
 }
 
 /* Writes a whole packet; `out` has room for trw_packet_size(header->frame_count). Returns its size. */
-static inline size_t trw_encode(uint8_t *out, const trw_header *header, const trw_frame *frames) {
+static inline size_t trw_encode(uint8_t* out, const trw_header* header, const trw_frame* frames) {
   trw_put_header(out, header);
   size_t at = (size_t)TRW_HEADER_SIZE;
   for (size_t i = 0; i < header->frame_count; ++i, at += (size_t)TRW_FRAME_SIZE) {
@@ -165,7 +163,7 @@ static inline size_t trw_encode(uint8_t *out, const trw_header *header, const tr
 }
 
 /* Looks at the beginning of `in` without the checksum: what a packet there would be. */
-static inline trw_result trw_parse_header(const uint8_t *in, size_t size, trw_header *header) {
+static inline trw_result trw_parse_header(const uint8_t* in, size_t size, trw_header* header) {
   static const uint8_t sync[4] = {0x54u, 0x52u, 0x57u, 0xA5u};
   for (size_t i = 0; i < 4; ++i) {
     if (i == size) return TRW_NEED_MORE;
@@ -190,7 +188,7 @@ static inline trw_result trw_parse_header(const uint8_t *in, size_t size, trw_he
 /* Parses the packet at the start of `in`. On TRW_OK the packet is trw_packet_size(header->frame_count)
  * long and its frames start at in + TRW_HEADER_SIZE. After any TRW_BAD_ result the caller drops one byte
  * and tries again: a packet cut short by another one is then found. Nothing is ever read beyond `size`. */
-static inline trw_result trw_parse(const uint8_t *in, size_t size, trw_header *header) {
+static inline trw_result trw_parse(const uint8_t* in, size_t size, trw_header* header) {
   trw_result found = trw_parse_header(in, size, header);
   if (found != TRW_OK) return found;
   size_t whole = trw_packet_size(header->frame_count);

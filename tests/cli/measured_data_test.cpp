@@ -35,11 +35,15 @@ TEST_F(MeasuredData, StrawsonSweepsGiveCtAgainstSpeed) {
   EXPECT_EQ(json["groups"].size(), 208u);
   EXPECT_EQ(json["left_out"]["unknown"], 0);
   EXPECT_GT(json["left_out"]["at_rest"], 100) << "the sweeps begin with the motor at rest";
+  std::set<std::string> pulling;
   for (const auto& group : json["groups"]) {
     const double c_t = group["c_t_median"];
-    EXPECT_TRUE(c_t > 0.05 && c_t < 0.35)
+    if (c_t < 0) pulling.insert(group["group"]);
+    EXPECT_TRUE(std::abs(c_t) > 0.05 && std::abs(c_t) < 0.35)
         << group["group"] << " " << c_t;  // 5-inch propellers of two to four blades
   }
+  EXPECT_THAT(pulling, testing::ElementsAre("m7_11.csv", "m7_7.csv", "m8_11.csv", "m8_7.csv"))
+      << "measured with the propeller the other way round: kept as measured";
   EXPECT_THAT(read_text(folder / "s.png").substr(1, 3), "PNG");
 }
 

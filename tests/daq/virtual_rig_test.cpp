@@ -28,7 +28,8 @@ std::vector<std::byte> first_bytes(const VirtualRig& rig, const VirtualRunReques
   const auto board = rig.board(run, 0, {});
   std::vector<std::byte> bytes(400000);  // some 24 s
   std::size_t size = 0;
-  while (size < bytes.size()) size += board->read(std::span(bytes).subspan(size), std::chrono::milliseconds(50)).size;
+  while (size < bytes.size())
+    size += board->read(std::span(bytes).subspan(size), std::chrono::milliseconds(50)).size;
   return bytes;
 }
 

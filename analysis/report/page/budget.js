@@ -20,47 +20,51 @@ const patterns = ['', '', '', '', '/', '\\', '.', 'x', '-'];
 
 const usedSources = (locations) =>
     Object.keys(sources).filter((source) => locations.some((l) => l.c_t_budget[source] > 0));
-const combined = ({c_t_budget: budget}) =>
-    Math.sqrt(Object.values(budget).reduce((sum, u) => sum + u * u, 0));
 
-function drawBudget(locations, width) {
-  const colours = budgetColours();
-  const data = usedSources(locations).map((source) => {
-    const k = Object.keys(sources).indexOf(source);
-    const percent = (l, value) => (100 * value) / l.c_t.mean;
-    return {
-      type: 'bar',
-      name: sources[source],
-      x: locations.map((l) => plain(l.location)),
-      y: locations.map((l) => percent(l, l.c_t_budget[source] ** 2 / (combined(l) || 1))),
-      text: locations.map(
-          (l) => `${plain(l.location)}, ${sources[source]}<br>u ${
-                     fixed(percent(l, l.c_t_budget[source]), 3)} % of C<sub>T</sub><br>` +
-              `${fixed((100 * l.c_t_budget[source] ** 2) / (combined(l) ** 2 || 1), 0)} % of the variance`),
-      textposition: 'none',
-      hovertemplate: '%{text}<extra></extra>',
-      marker: {
-        color: colours[k],
-        pattern: {shape: patterns[k], fillmode: 'overlay', fgcolor: style('--page'), size: 5},
-        line: {width: 0}
-      }
-    };
+/** One source in all bars; squares add up, so each part is drawn as large as its share of the variance. */
+function budgetBars(locations, source) {
+  const k = Object.keys(sources).indexOf(source);
+  const colour = budgetColours()[k];
+  const parts = locations.map(({location, c_t: {mean}, c_t_budget: budget}) => {
+    const combined = Math.hypot(...Object.values(budget));
+    const share = combined > 0 ? (budget[source] / combined) ** 2 : 0;
+    const u = `u ${fixed((100 * budget[source]) / mean, 3)} % of C<sub>T</sub>`;
+    const text =
+        `${plain(location)}, ${sources[source]}<br>${u}<br>${fixed(100 * share, 0)} % of the variance`;
+    return {height: (100 * share * combined) / mean, text};
   });
   return {
-    data,
+    type: 'bar',
+    name: sources[source],
+    x: locations.map((l) => plain(l.location)),
+    y: parts.map((part) => part.height),
+    text: parts.map((part) => part.text),
+    textposition: 'none',
+    hovertemplate: '%{text}<extra></extra>',
+    marker: {
+      color: colour,
+      pattern: {shape: patterns[k], fillmode: 'overlay', fgcolor: style('--page'), size: 5},
+      line: {width: 0},
+    },
+  };
+}
+
+function drawBudget(locations, width) {
+  const labels = {
+    tickangle: -90,
+    tickfont: {size: 10},
+    tickmode: width > 14 * locations.length ? 'linear' : 'auto'
+  };
+  return {
+    data: usedSources(locations).map((source) => budgetBars(locations, source)),
     layout: {
       barmode: 'stack',
       bargap: 0.15,
-      xaxis: axis('location', {
-        type: 'category',
-        showgrid: false,
-        tickangle: -90,
-        tickfont: {size: 10},
-        tickmode: width > 14 * locations.length ? 'linear' : 'auto'
-      }),
+      xaxis: axis('location', {type: 'category', showgrid: false, ...labels}),
       yaxis: axis('u(C<sub>T</sub>) [% of C<sub>T</sub>]', {rangemode: 'tozero'}),
-      legend: {orientation: 'h', y: 1.02, yanchor: 'bottom', traceorder: 'normal'}
-    }
+      showlegend: true,
+      legend: {orientation: 'h', y: 1.02, yanchor: 'bottom', traceorder: 'normal'},
+    },
   };
 }
 
@@ -82,17 +86,20 @@ function budgetTable(locations) {
 function budgetSection() {
   const {locations, notes} = report.sections.locations;
   const place = plot(
-      'Stacked bars of the standard uncertainty of C_T by source and location; the table beneath has the numbers',
+      'Standard uncertainty of C_T by source and location; the table beneath has the numbers',
       (width) => (isNarrow(width) ? 520 : 480), (width) => drawBudget(locations, width));
+  const caption = sentences(
+      'The height of a bar is the combined standard uncertainty u; squares of parts add up, so each',
+      'part is drawn as large as its share of the variance. U95 is u times Student’s t, about 2.',
+      'Calibration, propellers and instruments are shared by all locations and cancel for the most',
+      'part in ΔC_T.');
+  const leftOutOfIt =
+      [h('p', {}, 'What the budget leaves out:'), h('ul', {}, notes.map((note) => h('li', {}, note)))];
   return [
     figure(
-        'Standard uncertainty of C_T by source', [], place,
-        'The height of a bar is the combined standard uncertainty u; squares of parts add up, so each part is drawn as large as its share of the variance. ' +
-            'U95 is u times Student\'s t, about 2. Calibration, propellers and instruments are shared by all locations and cancel for the most part in ΔC_T.',
+        'Standard uncertainty of C_T by source', [], place, caption,
         command('reduce', '--csv coefficients.csv')),
-    notes.length ?
-        [h('p', {}, 'What the budget leaves out:'), h('ul', {}, notes.map((note) => h('li', {}, note)))] :
-        [],
+    notes.length ? leftOutOfIt : [],
     folded('The budget as a table', () => budgetTable(locations)),
   ];
 }

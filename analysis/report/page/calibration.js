@@ -34,24 +34,25 @@ function drawResiduals(cell, colour, forces, reach) {
   };
 }
 
+/** Panels on common axes, so that cells can be compared. */
 function residualFigure(cells) {
-  const reach = 1.15 *
-      Math.max(
-          ...cells.flatMap((c) => [2000 * c.residual_std_N, ...c.residual_N.map((r) => 1000 * Math.abs(r))]));
+  const residuals = cells.flatMap((c) => [2 * c.residual_std_N, ...c.residual_N.map(Math.abs)]);
+  const reach = 1150 * Math.max(...residuals);
   const applied = cells.flatMap((c) => c.force_N);
-  const room = 0.06 * (Math.max(...applied) - Math.min(...applied));
-  const forces = [Math.min(...applied) - room, Math.max(...applied) + room];
-  const panels = cells.map(
-      (cell, i) =>
-          h('div', {}, h('h4', {}, `Cell ${cell.cell}`),
-            plot(
-                `Residuals of cell ${cell.cell} against force`, () => 260,
-                () => drawResiduals(cell, rotorColours()[i], forces, reach))));
+  const [low, high] = [Math.min(...applied), Math.max(...applied)];
+  const room = 0.06 * (high - low);
+  const panels = cells.map((cell, i) => {
+    const build = () => drawResiduals(cell, rotorColours()[i], [low - room, high + room], reach);
+    return h(
+        'div', {}, h('h4', {}, `Cell ${cell.cell}`),
+        plot(`Residuals of cell ${cell.cell} against force`, () => 260, build));
+  });
+  const caption = sentences(
+      'How much more force the fitted line gives than was applied, point by point; band: twice the',
+      'standard deviation of the residuals. A bow, a trend or a fan says that a straight line with',
+      'one noise is not the whole truth. Diamonds stick out; crosses were left out as gross errors.');
   return figure(
-      'Residuals of the calibration', [], h('div', {class: 'panels'}, panels),
-      'How much more force the fitted line gives than was applied, point by point; band: twice the standard deviation of the residuals. A bow, a ' +
-          'trend or a fan says that a straight line with one noise is not the whole truth. Diamonds stick out; crosses were left out as gross errors.',
-      command('calibrate'));
+      'Residuals of the calibration', [], h('div', {class: 'panels'}, panels), caption, command('calibrate'));
 }
 
 function cellTable(cells) {
@@ -80,29 +81,25 @@ const propellerTable = (propellers) => table(
     ],
     propellers);
 
+const verdictOf = ({passed}) => badge(passed ? 'ok' : 'problem', passed ? 'passed' : 'not passed');
+
 const gateTable = (gates) => table(
     'Gates of the certificate',
     [
       {name: 'cell', cell: (g) => String(g.cell)},
       {name: 'gate', cell: (g) => g.name, text: true},
-      {
-        name: 'verdict',
-        cell: (g) => badge(g.passed ? 'ok' : 'problem', g.passed ? 'passed' : 'not passed'),
-        text: true
-      },
+      {name: 'verdict', cell: verdictOf, text: true},
       {name: 'found', cell: (g) => g.finding, text: true},
     ],
     gates);
 
 function calibrationSection({id, passed, cells, gates, warnings, propellers}) {
   const failed = gates.filter((gate) => !gate.passed);
+  const all = counted(gates.length, 'gate');
+  const verdict = passed ? `all ${all} passed.` :
+                           `${failed.length} of ${all} not passed; the coefficients rest on it all the same.`;
   return [
-    h('p', {}, badge(passed ? 'ok' : 'problem', passed ? 'passed' : 'not passed'),
-      ` Certificate ${id}: ` +
-          (passed ?
-               `all ${counted(gates.length, 'gate')} passed.` :
-               `${failed.length} of ${
-                   counted(gates.length, 'gate')} not passed; the coefficients rest on it all the same.`)),
+    h('p', {}, verdictOf({passed}), ` Certificate ${id}: ${verdict}`),
     failed.length ? gateTable(failed) : [],
     warnings.length ? h('ul', {}, warnings.map((warning) => h('li', {}, warning))) : [],
     residualFigure(cells),

@@ -48,6 +48,9 @@ function withU95(value, u95, signed = false) {
 /** Text for Plotly, which reads tags in texts. */
 const plain = (text) => String(text).replace(/&/g, '&amp;').replace(/</g, '&lt;').replace(/>/g, '&gt;');
 
+/** One text of the sentences that there are. */
+const sentences = (...parts) => parts.filter(Boolean).join(' ');
+
 const counted = (n, noun) => `${n.toLocaleString('en')} ${noun}${n === 1 ? '' : 's'}`;
 
 /** "2026-03-02 08:00" */

@@ -5,7 +5,14 @@ const quantities = {
   u_percent: {plain: 'U', unit: ' %', axis: 'U [%]', format: '~g'},
 };
 
-/** The tunnel's columns from the middle outwards: {name, label, y_norm, locations}. */
+/** "H3" where all locations of a column are the thesis's of that name. */
+function columnName(locations) {
+  const names =
+      new Set(locations.map((l) => (l.location === 'OT' ? 'H0' : /^(H\d+)V-?\d+$/.exec(l.location)?.[1])));
+  return names.size === 1 ? [...names][0] : undefined;
+}
+
+/** The tunnel's columns from the middle outwards: {y_norm, locations, name, label}. */
 function columnsOf(locations) {
   const columns = new Map();
   for (const location of locations.filter((l) => known(l.y_norm))) {
@@ -13,28 +20,21 @@ function columnsOf(locations) {
     if (!columns.has(key)) columns.set(key, {y_norm: location.y_norm, locations: []});
     columns.get(key).locations.push(location);
   }
-  return [...columns.values()]
-      .sort((a, b) => Math.abs(a.y_norm) - Math.abs(b.y_norm) || a.y_norm - b.y_norm)
-      .map((column) => {
-        const names = new Set(column.locations.map(
-            (l) => (l.location === 'OT' ? 'H0' : /^(H\d+)V-?\d+$/.exec(l.location)?.[1])));
-        const name = names.size === 1 ? [...names][0] : undefined;
-        const y = `ȳ = ${fixed(column.y_norm, 2)}`;
-        return {
-          ...column,
-          name,
-          label: name ? `${name} (${y})` : y,
-          locations: column.locations.sort((a, b) => a.z_norm - b.z_norm)
-        };
-      });
+  for (const column of columns.values()) {
+    column.locations.sort((a, b) => a.z_norm - b.z_norm);
+    column.name = columnName(column.locations);
+    const y = `ȳ = ${fixed(column.y_norm, 2)}`;
+    column.label = column.name ? `${column.name} (${y})` : y;
+  }
+  return [...columns.values()].sort((a, b) => Math.abs(a.y_norm) - Math.abs(b.y_norm) || a.y_norm - b.y_norm);
 }
 
-const describe = (location, quantity) => {
+function describe(location, quantity) {
   const {plain: symbol, unit} = quantities[quantity];
   const {mean, u95} = location[quantity];
-  return `${plain(location.location)}<br>${symbol} ${withU95(mean, u95)}${unit}<br>${
-      counted(location.runs, 'run')}, ${counted(location.sessions, 'session')}`;
-};
+  const made = `${counted(location.runs, 'run')}, ${counted(location.sessions, 'session')}`;
+  return `${plain(location.location)}<br>${symbol} ${withU95(mean, u95)}${unit}<br>${made}`;
+}
 
 /** Means with U95 as error bars. */
 function means(locations, x, quantity, colour, more) {
@@ -48,61 +48,56 @@ function means(locations, x, quantity, colour, more) {
     text: locations.map((l) => describe(l, quantity)),
     hovertemplate: '%{text}<extra></extra>',
     ...more,
-    marker: {color: colour, size: 8, ...more.marker}
+    marker: {color: colour, size: 8, ...more.marker},
   };
 }
 
 /** The single runs of some locations as faint points. */
 function singles(locations, x, quantity, colour, more) {
+  const {runs} = report;
   const position = new Map(locations.map((l, i) => [l.location, x[i]]));
-  const chosen = report.runs.run.map((_, i) => i)
-                     .filter((i) => position.has(report.runs.location[i]) && known(report.runs[quantity][i]));
+  const chosen =
+      runs.run.map((_, i) => i).filter((i) => position.has(runs.location[i]) && known(runs[quantity][i]));
   return {
     type: 'scatter',
     mode: 'markers',
-    x: chosen.map((i) => position.get(report.runs.location[i])),
-    y: chosen.map((i) => report.runs[quantity][i]),
-    text: chosen.map((i) => `run ${plain(report.runs.run[i])}, session ${plain(report.runs.session[i])}`),
+    x: chosen.map((i) => position.get(runs.location[i])),
+    y: chosen.map((i) => runs[quantity][i]),
+    text: chosen.map((i) => `run ${plain(runs.run[i])}, session ${plain(runs.session[i])}`),
     marker: {color: colour, size: 5, opacity: isDark() ? 0.45 : 0.3},
     showlegend: false,
     hovertemplate: '%{text}<br>%{y:.5~g}<extra></extra>',
-    ...more
+    ...more,
   };
 }
 
-const heightAxis = (more = {}) => axis(
-    '← ground  z̄ = 2z/(h<sub>t</sub> − h<sub>q</sub>)  ceiling →',
-    {range: [-1.08, 1.08], zeroline: false, ...more});
+const heightAxis = (more = {}) => axis(heightTitle, {range: [-1.08, 1.08], zeroline: false, ...more});
 
 const kApart = 0.012;  // of z_norm between curves, so that error bars of one height do not cover each other
 
 function drawColumns(columns, quantity, withSingles) {
   const data = columns.flatMap((column, i) => {
     const colour = orderedColour(i, columns.length);
-    const group = {legendgroup: column.label};
     const x = column.locations.map((l) => l.z_norm + kApart * (i - (columns.length - 1) / 2));
-    const curve = means(
-        column.locations, x, quantity, colour,
-        {name: plain(column.label), marker: {symbol: symbols[i % symbols.length]}, ...group});
+    const group = {legendgroup: column.label};
+    const look = {name: plain(column.label), marker: {symbol: symbols[i % symbols.length]}, ...group};
+    const curve = means(column.locations, x, quantity, colour, look);
     return withSingles ? [singles(column.locations, x, quantity, colour, group), curve] : [curve];
   });
   const {axis: title, format} = quantities[quantity];
-  return {
-    data,
-    layout:
-        {xaxis: heightAxis(), yaxis: axis(title, {tickformat: format, zeroline: quantity === 'u_percent'})}
-  };
+  const yaxis = axis(title, {tickformat: format, zeroline: quantity === 'u_percent'});
+  return {data, layout: {xaxis: heightAxis(), yaxis}};
 }
 
 /** Campaigns without places in a tunnel: one point a location, side by side. */
 function drawLabels(locations, quantity, withSingles) {
   const colour = rotorColours()[0];
   const x = locations.map((l) => plain(l.location));
-  const curve = means(locations, x, quantity, colour, {mode: 'markers', showlegend: false});
+  const points = means(locations, x, quantity, colour, {mode: 'markers', showlegend: false});
   const {axis: title, format} = quantities[quantity];
   return {
-    data: withSingles ? [singles(locations, x, quantity, colour, {}), curve] : [curve],
-    layout: {xaxis: axis('location', {type: 'category'}), yaxis: axis(title, {tickformat: format})}
+    data: withSingles ? [singles(locations, x, quantity, colour, {}), points] : [points],
+    layout: {xaxis: axis('location', {type: 'category'}), yaxis: axis(title, {tickformat: format})},
   };
 }
 
@@ -115,26 +110,24 @@ function locationFigure(title, quantity, tells) {
       () =>
           (columns.length ? drawColumns(columns, quantity, withSingles) :
                             drawLabels(locations, quantity, withSingles)));
+  const box = tick('single runs', true, (on) => {
+    withSingles = on;
+    redraw(place);
+  });
   const shown = columns.length ?
-      'One curve for each distance from the tunnel\'s middle plane, by height; points of one height are set apart a little so that their bars can be read.' :
+      sentences(
+          'One curve for each distance from the tunnel’s middle plane, by height; points of one height are set',
+          'apart a little, so that their bars can be read.') :
       'No location has a place in a tunnel (y_norm and z_norm are empty), so they stand side by side.';
-  return figure(
-      title,
-      tick(
-          'single runs', true,
-          (on) => {
-            withSingles = on;
-            redraw(place);
-          }),
-      place,
-      `${shown} ${
-          tells} Faint points: single runs. Error bars: U95 of the mean, from the repeats, the sessions and what locations share ` +
-          '(the budget is below); points of one curve share most of their calibration, so they move together.',
-      command('reduce', '--csv coefficients.csv'));
+  const caption = sentences(
+      shown, tells,
+      'Faint points: single runs. Error bars: U95 of the mean, from the repeats, the sessions and what',
+      'locations share; all points share their calibration, so they move together.');
+  return figure(title, box, place, caption, command('reduce', '--csv coefficients.csv'));
 }
 
 const locationsSection = () => locationFigure(
     'C_T against height', 'c_t', 'C_T is of all rotors together, over ½ρΩ²R² and one propeller disc.');
 const unevenSection = () => locationFigure(
     'U against height', 'u_percent',
-    'U is the thrust of the right pair minus that of the left, over all four; negative rolls towards the right wall.');
+    'U is the thrust of the right pair minus that of the left, over all four; negative rolls to the right.');

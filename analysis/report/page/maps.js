@@ -12,8 +12,8 @@ const fields = {
     plain: 'U',
     of: 'U',
     tells:
-        'The right pair minus the left pair, over all four. Blue (negative): the right pair lifts less and the vehicle ' +
-        'rolls to the right; red: to the left. On the middle plane it is 0 by symmetry.',
+        'The right pair minus the left pair, over all four. Blue (negative): the right pair lifts less and the ' +
+        'vehicle rolls to the right; red: to the left. On the middle plane it is 0 by symmetry.',
   },
 };
 
@@ -28,23 +28,49 @@ const decimalsOf = (step) => (String(Number(step.toPrecision(3))).split('.')[1] 
 const rowsOf = (values, columns) => Array.from(
     {length: values.length / columns}, (_, row) => values.slice(row * columns, (row + 1) * columns));
 
+/** Whether a location on that side of the middle plane was measured. */
+const onSide = (maps, sign) => maps.locations.some((l) => sign * l.y_norm > 0);
+
+/** What is drawn of a field: itself, from −greatest to greatest, or its U95, from 0. */
+function layerOf(maps, field, layer) {
+  const isValue = layer === 'value';
+  const values = isValue ? maps[field].value_percent : maps[field].u95_percent;
+  const largest = Math.max(1e-6, ...values.map(Math.abs));
+  const step = niceStep(largest / 5), greatest = step * Math.ceil(largest / step);
+  const {plain: symbol} = fields[field];
+  return {
+    isValue,
+    rows: rowsOf(values, maps.y_norm.length),
+    others: rowsOf(isValue ? maps[field].u95_percent : maps[field].value_percent, maps.y_norm.length),
+    step,
+    greatest,
+    lowest: isValue ? -greatest : 0,
+    spacing: niceStep((Math.max(...values) - Math.min(...values) || 1) / (isValue ? 14 : 5)),
+    title: isValue ? `${symbol} [%]` : `U<sub>95</sub>(${symbol}) [%]`,
+    hover: isValue ? `${symbol} %{z:+.2f} ± %{customdata[0]} %` :
+                     `U<sub>95</sub> %{z:.2f} %, of ${symbol} %{customdata[0]} %`,
+  };
+}
+
 /**
- * Contour lines of the columns from `from` to `to`; dashed where the map is the mirror image of what was
- * measured.
+ * Contour lines from column `from` to `to`; dashed where the map is the mirror image of what was measured.
  */
-function lines(maps, z, from, to, dash, levels) {
+function lines(maps, layer, from, to, dash) {
+  const reach = layer.spacing * Math.ceil(layer.greatest / layer.spacing);
   return {
     type: 'contour',
     x: maps.y_norm.slice(from, to),
     y: maps.z_norm,
-    z: z.map((row) => row.slice(from, to)),
+    z: layer.rows.map((row) => row.slice(from, to)),
     autocontour: false,
     contours: {
-      ...levels,
+      start: -reach,
+      end: reach,
+      size: layer.spacing,
       coloring: 'none',
       showlabels: true,
       labelformat: '~g',
-      labelfont: {size: 11, color: '#1b1f24'}
+      labelfont: {size: 11, color: '#1b1f24'},
     },
     line: {color: '#303030', width: 1.1, dash, smoothing: 1},
     showscale: false,
@@ -53,29 +79,42 @@ function lines(maps, z, from, to, dash, levels) {
   };
 }
 
-function heat(maps, field, layer, z, greatest) {
-  const u95 = layer === 'value' ? maps[field].u95_percent : maps[field].value_percent;
-  const n = maps.y_norm.length;
-  const customdata = maps.z_norm.map(
-      (zn, row) => maps.y_norm.map(
-          (yn, column) =>
-              [fixed(u95[row * n + column], 2, layer !== 'value'), fixed(yn * maps.y_m_per_norm, 3),
-               fixed(zn * maps.z_m_per_norm, 3)]));
-  const {plain: symbol} = fields[field];
-  const value = layer === 'value' ? `${symbol} %{z:+.2f} ± %{customdata[0]} %` :
-                                    `U<sub>95</sub> %{z:.2f} % of ${symbol} %{customdata[0]} %`;
+function colourBar({lowest, greatest, step, isValue, title}, narrow) {
+  const ticks =
+      Array.from({length: Math.round((greatest - lowest) / step) + 1}, (_, i) => greatest - i * step);
+  const below = {orientation: 'h', y: -0.16, yanchor: 'top', x: 0.5};
+  return {
+    title: {text: title, side: narrow ? 'bottom' : 'right'},
+    tickvals: ticks,
+    ticktext: ticks.map((tick) => fixed(tick, decimalsOf(step), isValue)),
+    outlinewidth: 0,
+    thickness: 14,
+    ...(narrow ? below : {}),
+  };
+}
+
+function heat(maps, layer, narrow) {
+  const metres = (norm, perNorm) => fixed(norm * perNorm, 3);
+  const customdata = layer.others.map(
+      (row, r) => row.map(
+          (other, c) =>
+              [fixed(other, 2, !layer.isValue),
+               metres(maps.y_norm[c], maps.y_m_per_norm),
+               metres(maps.z_norm[r], maps.z_m_per_norm),
+  ]));
+  const place = 'ȳ %{x:.2f}, z̄ %{y:.2f}<br>y %{customdata[1]} m, z %{customdata[2]} m';
   return {
     type: 'heatmap',
     x: maps.y_norm,
     y: maps.z_norm,
-    z,
+    z: layer.rows,
     customdata,
     zsmooth: 'best',
-    zmin: layer === 'value' ? -greatest : 0,
-    zmax: greatest,
-    colorscale: layer === 'value' ? diverging : sequential,
-    hovertemplate:
-        `${value}<br>ȳ %{x:.2f}, z̄ %{y:.2f}<br>y %{customdata[1]} m, z %{customdata[2]} m<extra></extra>`,
+    zmin: layer.lowest,
+    zmax: layer.greatest,
+    colorscale: layer.isValue ? diverging : sequential,
+    colorbar: colourBar(layer, narrow),
+    hovertemplate: `${layer.hover}<br>${place}<extra></extra>`,
   };
 }
 
@@ -87,101 +126,69 @@ function crosses(maps, field) {
     x: maps.locations.map((l) => l.y_norm),
     y: maps.locations.map((l) => l.z_norm),
     showlegend: false,
-    cliponaxis: false
+    cliponaxis: false,
   };
-  const text = maps.locations.map(
-      (l) => `${plain(l.location)} as measured<br>${fields[field].plain} ${withU95(...l[field], true)} %`);
+  const cross = (width, color) => ({symbol: 'x-thin', size: 9, line: {width, color}});
+  const {plain: symbol} = fields[field];
+  const measured = (l) => `${plain(l.location)} as measured<br>${symbol} ${withU95(...l[field], true)} %`;
   return [
-    {...common, hoverinfo: 'skip', marker: {symbol: 'x-thin', size: 9, line: {width: 4.5, color: '#ffffff'}}},
+    {...common, marker: cross(4.5, '#ffffff'), hoverinfo: 'skip'},
     {
       ...common,
-      text,
+      marker: cross(1.8, '#101010'),
+      text: maps.locations.map(measured),
       hovertemplate: '%{text}<extra></extra>',
-      marker: {symbol: 'x-thin', size: 9, line: {width: 1.8, color: '#101010'}}
-    }
+    },
   ];
 }
 
-function drawMap(maps, field, layer, width) {
-  const n = maps.y_norm.length, middle = (n - 1) / 2;
-  const values = layer === 'value' ? maps[field].value_percent : maps[field].u95_percent;
-  const z = rowsOf(values, n);
-  const largest = Math.max(1e-6, ...values.map(Math.abs));
-  const step = niceStep(largest / 5), greatest = step * Math.ceil(largest / step);
-  const ticks = Array.from(
-      {length: Math.round(greatest / step) * (layer === 'value' ? 2 : 1) + 1}, (_, i) => greatest - i * step);
-  const spacing = niceStep((Math.max(...values) - Math.min(...values) || 1) / (layer === 'value' ? 14 : 5));
-  const levels = {
-    start: -spacing * Math.ceil(largest / spacing),
-    end: spacing * Math.ceil(largest / spacing),
-    size: spacing
-  };
-  const dash = (sign) => (maps.locations.some((l) => sign * l.y_norm > 0) ? 'solid' : 'dash');
+function drawMap(maps, field, layerName, width) {
+  const layer = layerOf(maps, field, layerName);
+  const last = maps.y_norm.length, middle = (last - 1) / 2;
+  const dash = (sign) => (onSide(maps, sign) ? 'solid' : 'dash');
   const narrow = isNarrow(width);
-  const bar = {
-    title: {
-      text: layer === 'value' ? `${fields[field].plain} [%]` : `U<sub>95</sub>(${fields[field].plain}) [%]`,
-      side: narrow ? 'bottom' : 'right'
-    },
-    tickvals: ticks,
-    ticktext: ticks.map((t) => fixed(t, decimalsOf(step), layer === 'value')),
-    outlinewidth: 0,
-    thickness: 14,
-    ...(narrow ? {orientation: 'h', y: -0.16, yanchor: 'top', x: 0.5} : {len: 1, lenmode: 'fraction'})
-  };
+  const side = {range: [-1, 1], constrain: 'domain', dtick: 0.5, zeroline: false, showgrid: false};
   return {
     data: [
-      {...heat(maps, field, layer, z, greatest), colorbar: bar},
-      lines(maps, z, 0, middle + 1, dash(-1), levels), lines(maps, z, middle, n, dash(1), levels),
-      ...crosses(maps, field)
+      heat(maps, layer, narrow),
+      lines(maps, layer, 0, middle + 1, dash(-1)),
+      lines(maps, layer, middle, last, dash(1)),
+      ...crosses(maps, field),
     ],
     layout: {
-      xaxis: axis(
-          '← wall  ȳ = 2y/(w<sub>t</sub> − w<sub>q</sub>)  wall →',
-          {range: [-1, 1], constrain: 'domain', dtick: 0.5, zeroline: false, showgrid: false}),
-      yaxis: axis('← ground  z̄ = 2z/(h<sub>t</sub> − h<sub>q</sub>)  ceiling →', {
-        range: [-1, 1],
-        constrain: 'domain',
-        scaleanchor: 'x',
-        dtick: 0.5,
-        zeroline: false,
-        showgrid: false
-      }),
+      xaxis: axis('← wall  ȳ = 2y/(w<sub>t</sub> − w<sub>q</sub>)  wall →', side),
+      yaxis: axis(heightTitle, {...side, scaleanchor: 'x'}),
       margin: {l: 10, r: narrow ? 10 : 90, t: 30, b: narrow ? 90 : 10},
     },
   };
 }
 
+/** How well the field predicts a location that it was not shown. */
+function fitOf({leave_one_out_rms_percent: rms, leave_one_out_standardised: standardised}) {
+  const times = known(standardised) ? `, ${fixed(standardised, 2)} times what its uncertainty says` : '';
+  return 'Each location predicted from all others is off by ' +
+      `${fixed(rms, 2)} percentage points (root mean square)${times}.`;
+}
+
 function mapFigure(maps, field) {
   const {title, of, tells} = fields[field];
-  const fit = maps[field];
   let layer = 'value';
-  const place = plot(
-      `Map of ${title.toLowerCase()} over the cross-section; its numbers are in the table of locations`,
-      (width) => (isNarrow(width) ? width + 70 : Math.min(600, 0.86 * width)),
-      (width) => drawMap(maps, field, layer, width));
-  const mirrored = maps.locations.some((l) => l.y_norm < 0) && maps.locations.some((l) => l.y_norm > 0) ?
-      '' :
-      ' Dashed lines: the mirror image of the measured half.';
-  const standard = known(fit.leave_one_out_standardised) ?
-      `, ${fixed(fit.leave_one_out_standardised, 2)} times what its uncertainty says` :
-      '';
-  return figure(
-      title,
-      choice(
-          'Layer', {value: of, u95: `U95 of ${of}`},
-          (chosen) => {
-            layer = chosen;
-            redraw(place);
-          }),
-      place,
-      `${tells} Crosses: the ${maps.locations.length} measured locations.${
-          mirrored} U95, 1.96 standard uncertainties, comes from the covariance of the locations ` +
-          `(repeats, sessions, and what they share) and from the field in between (${
-              maps.method.replaceAll('-', ' ')}). Each location predicted from ` +
-          `all others is off by ${
-              fixed(fit.leave_one_out_rms_percent, 2)} percentage points (root mean square)${standard}.`,
-      command('map', '--out maps'));
+  const label =
+      `Map of ${title.toLowerCase()} over the cross-section; its numbers are in the table of locations`;
+  const height = (width) => (isNarrow(width) ? width + 70 : Math.min(600, 0.86 * width));
+  const place = plot(label, height, (width) => drawMap(maps, field, layer, width));
+  const layers = choice('Layer', {value: of, u95: `U95 of ${of}`}, (chosen) => {
+    layer = chosen;
+    redraw(place);
+  });
+  const mirrored = !(onSide(maps, -1) && onSide(maps, 1));
+  const caption = sentences(
+      tells, `Crosses: the ${maps.locations.length} measured locations.`,
+      mirrored && 'Dashed lines: the mirror image of the measured half.',
+      'U95, 1.96 standard uncertainties, comes from the covariance of the locations (repeats, sessions,',
+      `and what they share) and from the field in between (${maps.method.replaceAll('-', ' ')}).`,
+      fitOf(maps[field]));
+  return figure(title, layers, place, caption, command('map', '--out maps'));
 }
 
 const mapsSection = (maps) =>

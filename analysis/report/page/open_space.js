@@ -1,22 +1,22 @@
 // The tunnel's columns against open space, a ground plane and a ceiling plane: the thesis's figures 5.24
 // and 5.57.
 
-const planeNames = {
-  ground: 'GND, above a ground plane',
-  ceiling: 'CEIL, beneath a ceiling plane'
+const planeKinds = {
+  ground: {name: 'GND, above a ground plane', symbol: 'triangle-down'},
+  ceiling: {name: 'CEIL, beneath a ceiling plane', symbol: 'triangle-up'},
 };
 
-function planeTraces(section, byLabel, inTunnel) {
-  return Object.entries(planeNames).flatMap(([side, name], i) => {
-    const planes = section.planes.filter((p) => p.side === side).sort((a, b) => a.distance_R - b.distance_R);
-    if (!planes.length) return [];
-    const trace = means(
-        planes.map((p) => byLabel.get(p.location)), planes.map((p) => (inTunnel ? p.z_norm : p.distance_R)),
-        'c_t', rotorColours()[2 * i],
-        {name, marker: {symbol: side === 'ground' ? 'triangle-down' : 'triangle-up', size: 9}});
-    trace.text = trace.text.map((text, k) => `${text}<br>${fixed(planes[k].distance_R, 2)} R from the plane`);
-    return [{...trace, line: {...trace.line, dash: 'dot'}}];
-  });
+const hasPlane = (section, side) => section.planes.some((p) => p.side === side);
+
+function planeTrace(section, byLabel, side, colour, inTunnel) {
+  const planes = section.planes.filter((p) => p.side === side).sort((a, b) => a.distance_R - b.distance_R);
+  const {name, symbol} = planeKinds[side];
+  const trace = means(
+      planes.map((p) => byLabel.get(p.location)), planes.map((p) => (inTunnel ? p.z_norm : p.distance_R)),
+      'c_t', colour, {name, marker: {symbol, size: 9}});
+  trace.text = trace.text.map((text, i) => `${text}<br>${fixed(planes[i].distance_R, 2)} R from the plane`);
+  trace.line.dash = 'dot';
+  return trace;
 }
 
 /** Open space as a band of its U95, with a point of no size for the legend. */
@@ -38,28 +38,25 @@ function openSpace(location) {
 
 function drawAgainst(section, column, y) {
   const byLabel = new Map(report.sections.locations.locations.map((l) => [l.location, l]));
-  const data = planeTraces(section, byLabel, column !== undefined);
-  const shapes = [];
+  const [groundColour, , ceilingColour] = rotorColours();
+  const data = [], shapes = [];
   if (column) {
-    const colour = style('--ink');
-    data.unshift(means(
-        column.locations, column.locations.map((l) => l.z_norm), 'c_t', colour,
-        {name: `${plain(column.label)}, in the tunnel`}));
+    const look = {name: `${plain(column.label)}, in the tunnel`};
+    data.push(means(column.locations, column.locations.map((l) => l.z_norm), 'c_t', style('--ink'), look));
   }
+  if (hasPlane(section, 'ground')) data.push(planeTrace(section, byLabel, 'ground', groundColour, column));
+  if (hasPlane(section, 'ceiling')) data.push(planeTrace(section, byLabel, 'ceiling', ceilingColour, column));
   if (section.open_space) {
     const open = openSpace(byLabel.get(section.open_space));
     data.push(open.trace);
     shapes.push(...open.shapes);
   }
-  const range = [-1.15, 1.15];
+  const xaxis =
+      column ? heightAxis({range: [-1.15, 1.15]}) : axis('distance of the rotors from the plane [R]');
+  const yaxis = axis('C<sub>T</sub>', {tickformat: '.4f', range: y});
   return {
     data,
-    layout: {
-      xaxis: column ? heightAxis({range}) : axis('distance of the rotors from the plane [R]'),
-      yaxis: axis('C<sub>T</sub>', {tickformat: '.4f', range: y}),
-      shapes,
-      legend: {orientation: 'h', y: -0.2, yanchor: 'top'}
-    }
+    layout: {xaxis, yaxis, shapes, showlegend: true, legend: {orientation: 'h', y: -0.2, yanchor: 'top'}}
   };
 }
 
@@ -75,28 +72,31 @@ function commonRange(section, columns) {
   return [low - 0.04 * (high - low), high + 0.04 * (high - low)];
 }
 
+/** How the points of GND and CEIL came to their places. */
+function placement(section, column) {
+  if (!section.planes.length) return '';
+  if (!column)
+    return 'By the distance of the rotors from the plane: without a tunnel there is no height to place them at.';
+  return sentences(
+      'A point above a ground plane (GND) or beneath a ceiling plane (CEIL) stands at the height in the tunnel',
+      'that is as far from its floor or ceiling, z̄ = ∓(h_t − 2d)/(h_t − h_q) with d the distance; the rotors are',
+      'taken to be at the vehicle’s mid-height.');
+}
+
 function againstFigure(section, column, y) {
-  const title = column ? `${column.name ?? column.label} against open space` :
-                         'Ground and ceiling planes in open space';
+  const title = column ? `${column.name ?? column.label} against open space` : 'Planes in open space';
   const place = plot(
       `${title}; its numbers are in the table of locations`, (width) => (isNarrow(width) ? 520 : 480),
       () => drawAgainst(section, column, y));
-  const has = (side) => section.planes.some((p) => p.side === side);
-  const placed = column && section.planes.length ?
-      'A point above a ground plane (GND) or beneath a ceiling plane (CEIL) stands at the height in the tunnel that has the same distance from its ' +
-          'floor or ceiling, z̄ = ∓(h_t − 2d)/(h_t − h_q) with d the distance; the rotors are taken to be at the vehicle\'s mid-height.' :
-      section.planes.length ?
-      'By the distance of the rotors from the plane; without a column of a tunnel there is no height to place them at.' :
-      '';
   const missing = [
-    section.open_space ? '' : 'open space (OS)', has('ground') ? '' : 'a ground plane (GND)',
-    has('ceiling') ? '' : 'a ceiling plane (CEIL)'
+    !section.open_space && 'open space (OS)',
+    !hasPlane(section, 'ground') && 'a ground plane (GND)',
+    !hasPlane(section, 'ceiling') && 'a ceiling plane (CEIL)',
   ].filter(Boolean);
-  return figure(
-      title, [], place,
-      `${section.open_space ? 'Grey band: C_T in open space with its U95. ' : ''}${placed} Error bars: U95.` +
-          `${missing.length ? ` The campaign has no runs at ${missing.join(' and ')}.` : ''}`,
-      command('reduce', '--csv coefficients.csv'));
+  const caption = sentences(
+      section.open_space && 'Grey band: C_T in open space with its U95.', placement(section, column),
+      'Error bars: U95.', missing.length && `The campaign has no runs at ${missing.join(' and ')}.`);
+  return figure(title, [], place, caption, command('reduce', '--csv coefficients.csv'));
 }
 
 function openSpaceSection(section) {

@@ -32,7 +32,7 @@ const config = {
  */
 function plot(label, height, build) {
   const place = h('div', {class: 'plot', role: 'group', 'aria-label': label});
-  plots.push({place, height, build, drawn: false});
+  plots.push({place, height, build, begun: false, drawn: false});
   return place;
 }
 
@@ -41,11 +41,12 @@ function reserve(plot) {
 }
 
 async function draw(plot) {
-  plot.drawn = true;
+  plot.begun = true;
   const width = plot.place.clientWidth;
   const {data, layout} = plot.build(width);
   await Plotly.react(
       plot.place, data, {...baseLayout(width), ...layout, width, height: plot.height(width)}, config);
+  plot.drawn = true;
   tell();
 }
 
@@ -54,7 +55,7 @@ const redraw = (place) => draw(plots.find((plot) => plot.place === place)).catch
 
 function redrawAll() {
   plots.forEach(reserve);
-  return Promise.all(plots.filter((plot) => plot.drawn).map(draw)).catch(fail);
+  return Promise.all(plots.filter((plot) => plot.begun).map(draw)).catch(fail);
 }
 
 function drawWhenNear() {
@@ -62,26 +63,23 @@ function drawWhenNear() {
     for (const entry of entries.filter((e) => e.isIntersecting)) {
       near.unobserve(entry.target);
       const plot = plots.find((p) => p.place === entry.target);
-      if (!plot.drawn) draw(plot).catch(fail);
+      if (!plot.begun) draw(plot).catch(fail);
     }
   }, {rootMargin: '400px'});
   plots.forEach((plot) => near.observe(plot.place));
 }
 
 function drawWhenIdle() {
-  const next = plots.find((plot) => !plot.drawn);
+  const next = plots.find((plot) => !plot.begun);
   if (!next) return;
   const later = window.requestIdleCallback ?? ((work) => setTimeout(work, 50));
-  later(() => (next.drawn ? Promise.resolve() : draw(next)).catch(fail).then(drawWhenIdle));
+  later(() => (next.begun ? Promise.resolve() : draw(next)).catch(fail).then(drawWhenIdle));
 }
 
 /** On paper everything is there, light, and as wide as a page. */
 function drawForPaper(onPaper) {
   document.documentElement.classList.toggle('paper', onPaper);
-  if (onPaper)
-    plots.forEach((plot) => {
-      plot.drawn = true;
-    });
+  for (const plot of plots) plot.begun ||= onPaper;
   redrawAll();
 }
 

@@ -2,14 +2,13 @@
 
 const badge = (kind, text) => h('span', {class: `badge ${kind}`}, text);
 
+function findingItem({severity, check, found, advice}) {
+  const todo = advice ? h('div', {class: 'advice'}, '→ ', prose(advice)) : [];
+  return h('li', {}, badge(severity, severity), ' ', h('strong', {}, check), ' ', prose(found), todo);
+}
+
 const findingsSection = (findings) =>
-    [h('ul', {class: 'findings'},
-       findings.map(
-           ({severity, check, found, advice}) =>
-               h('li', {}, badge(severity, severity), ' ', h('strong', {}, check), ' ', prose(found),
-                 advice ? h('div', {class: 'advice'}, '→ ', prose(advice)) : []))),
-     h('p', {}, remade(command('doctor'))),
-];
+    [h('ul', {class: 'findings'}, findings.map(findingItem)), h('p', {}, remade(command('doctor')))];
 
 function leftOut(runs) {
   if (!runs.length) return [];
@@ -19,41 +18,32 @@ function leftOut(runs) {
   ];
 }
 
+/** Mean, scatter and U95 of a quantity, to as many decimals as the smallest U95 asks for. */
+function valueColumns(locations, quantity, name, signed) {
+  const decimals = Math.max(...locations.map((l) => decimalsFor(l[quantity].u95)));
+  return [
+    {name, cell: (l) => fixed(l[quantity].mean, decimals, signed)},
+    {name: 'std', cell: (l) => fixed(l[quantity].std, decimals)},
+    {name: 'U95', cell: (l) => (l[quantity].u95 > 0 ? fixed(l[quantity].u95, decimals) : '–')},
+  ];
+}
+
 function locationTable({locations, left_out: left}) {
   const {maps} = report.sections;
-  const change = new Map((maps.absent ? [] : maps.locations).map((l) => [l.location, l.delta_ct]));
-  const decimals = (quantity) => Math.max(...locations.map((l) => decimalsFor(l[quantity].u95)));
-  const value = (name, quantity, part, signed = false) => ({
-    name,
-    cell: (l) =>
-        fixed(part === 'u95' && l[quantity].u95 === 0 ? null : l[quantity][part], decimals(quantity), signed)
-  });
-  const uneven = report.rotors === 4 ?
-      [
-        value('U [%]', 'u_percent', 'mean', true), value('std', 'u_percent', 'std'),
-        value('U95', 'u_percent', 'u95')
-      ] :
-      [];
+  const change = new Map((maps.locations ?? []).map((l) => [l.location, withU95(...l.delta_ct, true)]));
+  const columns = [
+    {name: 'location', cell: (l) => l.location, text: true},
+    {name: 'ȳ', cell: (l) => fixed(l.y_norm, 2)},
+    {name: 'z̄', cell: (l) => fixed(l.z_norm, 2)},
+    {name: 'runs', cell: (l) => String(l.runs)},
+    {name: 'sessions', cell: (l) => String(l.sessions)},
+    ...valueColumns(locations, 'c_t', 'C_T', false),
+    {name: 'ΔC_T ± U95 [%]', cell: (l) => change.get(l.location) ?? '–'},
+    ...(report.rotors === 4 ? valueColumns(locations, 'u_percent', 'U [%]', true) : []),
+    {name: 'thrust [N]', cell: (l) => fixed(l.thrust_N, 3)},
+  ];
   return [
-    table(
-        'C_T and U by location',
-        [
-          {name: 'location', cell: (l) => l.location, text: true},
-          {name: 'ȳ', cell: (l) => fixed(l.y_norm, 2)},
-          {name: 'z̄', cell: (l) => fixed(l.z_norm, 2)},
-          {name: 'runs', cell: (l) => String(l.runs)},
-          {name: 'sessions', cell: (l) => String(l.sessions)},
-          value('C_T', 'c_t', 'mean'),
-          value('std', 'c_t', 'std'),
-          value('U95', 'c_t', 'u95'),
-          {
-            name: 'ΔC_T ± U95 [%]',
-            cell: (l) => (change.has(l.location) ? withU95(...change.get(l.location), true) : '–')
-          },
-          ...uneven,
-          {name: 'thrust [N]', cell: (l) => fixed(l.thrust_N, 3)},
-        ],
-        locations),
+    table('C_T and U by location', columns, locations),
     h('p', {}, remade(command('reduce', '--csv coefficients.csv'))),
     leftOut(left),
   ];
@@ -83,37 +73,39 @@ const inputsText = (inputs) =>
         .map(([name, value]) => `${name} ${typeof value === 'object' ? JSON.stringify(value) : value}`)
         .join(', ');
 
-function provenanceSection(documents) {
+const documentTable = (documents) => table(
+    'What the campaign file holds that was derived; the newest calibration is the one in force',
+    [
+      {name: 'document', cell: (d) => String(d.id)},
+      {name: 'kind', cell: (d) => d.kind, text: true},
+      {name: 'made (UTC)', cell: (d) => d.created_utc, text: true},
+      {name: 'program', cell: (d) => d.program, text: true},
+      {name: 'command', cell: (d) => code(d.arguments), text: true},
+      {name: 'from', cell: (d) => h('span', {class: 'wrap'}, inputsText(d.inputs)), text: true},
+    ],
+    documents);
+
+/** What this page itself was made from. */
+function facts() {
   const {program, arguments: made, created_utc: created, db, model} = report.made;
   const {calibration} = report.sections;
-  const facts = [
+  const list = [
     ['This page', [code(made), h('br'), `${program}, ${created}`]],
     ['Campaign file', h('code', {}, db)],
-    ...(report.kind === 'table' ?
-            [] :
-            [['Model', `${model}${model === 'thesis' ? ': dry air at 101325 Pa, nominal speed' : ''}`]]),
-    ...(calibration && !calibration.absent ? [[
-      'Calibration', [`document ${calibration.id}, of points `, h('code', {}, calibration.points_hash)]
-    ]] :
-                                             []),
   ];
+  if (report.kind === 'campaign')
+    list.push(['Model', model === 'thesis' ? 'thesis: dry air at 101325 Pa, nominal speed' : model]);
+  if (calibration?.points_hash)
+    list.push(
+        ['Calibration', [`document ${calibration.id}, of points `, h('code', {}, calibration.points_hash)]]);
+  return h('dl', {}, list.map(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
+}
+
+function provenanceSection(documents) {
+  const runs = report.runs?.run.length ?? 0;
   return [
-    h('dl', {}, facts.map(([name, value]) => [h('dt', {}, name), h('dd', {}, value)])),
-    documents.length ?
-        table(
-            'What the campaign file holds that was derived; the newest calibration is the one in force',
-            [
-              {name: 'document', cell: (d) => String(d.id)},
-              {name: 'kind', cell: (d) => d.kind, text: true},
-              {name: 'made (UTC)', cell: (d) => d.created_utc, text: true},
-              {name: 'program', cell: (d) => d.program, text: true},
-              {name: 'command', cell: (d) => code(d.arguments), text: true},
-              {name: 'from', cell: (d) => h('span', {class: 'wrap'}, inputsText(d.inputs)), text: true},
-            ],
-            documents) :
-        h('p', {}, 'The file holds nothing derived yet.'),
-    report.runs ?
-        folded(`All ${counted(report.runs.run.length, 'run')}, with the hashes of their raw data`, runTable) :
-        [],
+    facts(),
+    documents.length ? documentTable(documents) : h('p', {}, 'The file holds nothing derived yet.'),
+    runs ? folded(`All ${counted(runs, 'run')}, with the hashes of their raw data`, runTable) : [],
   ];
 }

@@ -6,8 +6,9 @@ const report = JSON.parse(document.getElementById('data').textContent);
 function command(verb, rest = '') {
   const {db, model} = report.made;
   const file = /^[\w./+-]+$/.test(db) ? db : `'${db.replaceAll('\'', '\'\\\'\'')}'`;
-  const terms = model !== 'thesis' && verb !== 'calibrate' && verb !== 'doctor' ?
-      ` --with ${model.replaceAll('+', ',')}` :
-      '';
-  return `tunnelrig ${verb} --db ${file}${rest ? ` ${rest}` : ''}${terms}`;
+  const words = ['tunnelrig', verb, '--db', file];
+  if (rest) words.push(rest);
+  if (model !== 'thesis' && ['reduce', 'map'].includes(verb))
+    words.push('--with', model.replaceAll('+', ','));
+  return words.join(' ');
 }

@@ -2,110 +2,90 @@
 
 /** Whether anything was measured, said plainly. */
 function originOfRuns({simulated, measured, unknown}) {
-  const parts = [];
-  if (simulated) parts.push(`${counted(simulated, 'run')} simulated by the virtual rig`);
-  if (measured) parts.push(`${counted(measured, 'run')} recorded from a board`);
-  if (unknown)
-    parts.push(`${
-        counted(
-            unknown,
-            'run')} imported without a word on where they come from (their column \`source\` is empty)`);
-  if (simulated && !measured && !unknown)
-    return {
-      kind: 'simulated',
-      text: `Simulated: all ${
-          counted(simulated, 'run')} come from the virtual rig. No number on this page was measured.`
-    };
-  if (measured && !simulated && !unknown)
-    return {kind: 'measured', text: `Measured: all ${counted(measured, 'run')} were recorded from a board.`};
-  if (unknown && !simulated && !measured)
-    return {
-      kind: 'unknown',
-      text: `Origin not recorded: the column \`source\` of all ${
-          counted(
-              unknown, 'run')} is empty, so the file does not say whether they were measured or simulated.`
-    };
-  return {
-    kind: simulated ? 'simulated' : 'unknown',
-    text: `Mixed: ${parts.join(', ')}. Locations may hold runs of more than one kind.`
-  };
+  const of = (n) => counted(n, 'run');
+  const kinds = [simulated, measured, unknown].filter(Boolean).length;
+  if (kinds > 1) {
+    const parts = [
+      simulated && `${of(simulated)} simulated by the virtual rig`,
+      measured && `${of(measured)} recorded from a board`,
+      unknown && `${of(unknown)} whose column \`source\` does not say where they come from`,
+    ];
+    return {kind: 'mixed', text: `Mixed: ${parts.filter(Boolean).join(', ')}.`};
+  }
+  if (simulated) {
+    const text = `all ${of(simulated)} come from the virtual rig. No number on this page was measured.`;
+    return {kind: 'simulated', text: `Simulated: ${text}`};
+  }
+  if (measured) return {kind: 'measured', text: `Measured: all ${of(measured)} were recorded from a board.`};
+  const text =
+      'the column `source` is empty in every run, so the file does not say whether they were measured ' +
+      'or simulated.';
+  return {kind: 'unknown', text: `Origin not recorded: ${text}`};
 }
 
-const at = ({location}) => `at ${location}`;
+const percent = ({value, u95}) => `${withU95(value, u95, true)} %`;
 
-function extremes(summary) {
-  const {greatest_delta_ct_percent: most, least_delta_ct_percent: least, greatest_uneven_percent: uneven} =
-      summary;
-  const sentences = [];
-  if (most)
-    sentences.push(
-        `Against OT, the middle of the tunnel, C_T changes by up to ${
-            withU95(most.value, most.u95, true)} % (${at(most)}) ` +
-        `and down to ${withU95(least.value, least.u95, true)} % (${at(least)}).`);
-  if (uneven)
-    sentences.push(
-        `The uneven thrust U is largest ${at(uneven)}: ${withU95(uneven.value, uneven.u95, true)} %` +
-        `${uneven.value < 0 ? ', so the right pair lifts less' : ''}.`);
-  return sentences;
+function changeOfThrust({greatest_delta_ct_percent: most, least_delta_ct_percent: least}) {
+  if (!most) return '';
+  const up = `${percent(most)} (at ${most.location})`, down = `${percent(least)} (at ${least.location})`;
+  return `Against OT, C_T changes by up to ${up} and down to ${down}.`;
+}
+
+function unevenThrust({greatest_uneven_percent: uneven}) {
+  if (!uneven) return '';
+  const side = uneven.value < 0 ? 'right' : 'left';
+  const value = `${percent(uneven)}, the ${side} pair lifting less`;
+  return `The uneven thrust U is largest at ${uneven.location}: ${value}.`;
 }
 
 function losses({frames_emitted: emitted, frames_lost: lost}) {
+  const all = emitted.toLocaleString('en');
   if (!emitted) return 'There are no raw data, so no losses either.';
-  if (!lost) return `None of the ${emitted.toLocaleString('en')} frames sampled was lost.`;
-  return `Of the ${emitted.toLocaleString('en')} frames sampled, ${lost.toLocaleString('en')} were lost (${
-      fixed((100 * lost) / emitted, 3)} %).`;
+  if (!lost) return `None of the ${all} frames sampled was lost.`;
+  const share = fixed((100 * lost) / emitted, 3);
+  return `Of the ${all} frames sampled, ${lost.toLocaleString('en')} were lost (${share} %).`;
+}
+
+function verdict({calibration_passed: passed}) {
+  if (passed === undefined) return '';
+  return `The calibration ${passed ? 'passed all its gates' : 'did not pass all its gates'}.`;
 }
 
 function summaryText(summary) {
-  const names = {OT: 'in the middle of the tunnel (OT)', OS: 'in open space (OS)'};
-  const c_t = (summary.c_t ?? []).map((v) => `${withU95(v.value, v.u95)} ${names[v.location]}`);
-  const verdict = {
-    true: 'The calibration passed all its gates.',
-    false: 'The calibration did not pass all its gates.'
-  };
-  const reduced = summary.reduced_runs;
-  return [
-    `${counted(summary.runs, 'run')} in ${counted(summary.sessions, 'session')}` +
-        (reduced ? `; ${counted(reduced, 'thrust run')} at ${
-                       counted(summary.locations, 'location')} give coefficients.` :
-                   '; none gives coefficients yet.'),
-    c_t.length ? `C_T is ${c_t.join(' and ')}.` : '',
-    ...extremes(summary),
-    losses(summary),
-    verdict[summary.calibration_passed] ?? '',
-    reduced ?
-        'Every ± on this page is U95, half the width of the interval that holds the value with 95 % probability.' :
-        '',
-  ].filter(Boolean)
-      .join(' ');
+  const places = {OT: 'in the middle of the tunnel (OT)', OS: 'in open space (OS)'};
+  const c_t = (summary.c_t ?? []).map((v) => `${withU95(v.value, v.u95)} ${places[v.location]}`);
+  const runs = `${counted(summary.runs, 'run')} in ${counted(summary.sessions, 'session')};`;
+  const {reduced_runs: reduced, locations} = summary;
+  const coefficients = () => `${counted(reduced, 'thrust run')} at ${counted(locations, 'location')}`;
+  return sentences(
+      runs, reduced ? `${coefficients()} give coefficients.` : 'none gives coefficients yet.',
+      c_t.length && `C_T is ${c_t.join(' and ')}.`, changeOfThrust(summary), unevenThrust(summary),
+      losses(summary), verdict(summary),
+      reduced && 'Every ± on this page is U95, which holds the value with 95 % probability.');
 }
 
 function headOfCampaign() {
-  const origin = originOfRuns(report.summary.origins);
+  const {kind, text} = originOfRuns(report.summary.origins);
   return [
-    h('p', {class: `origin ${origin.kind}`}, prose(origin.text)),
-    h('p', {class: 'summary'}, prose(summaryText(report.summary)))
+    h('p', {class: `origin ${kind}`}, prose(text)),
+    h('p', {class: 'summary'}, prose(summaryText(report.summary))),
   ];
 }
 
 function headOfTable() {
   const {table} = report.sections;
+  const rows = counted(report.observations, 'observation');
+  const groups = () =>
+      `, ${counted(table.reduced, 'value')} of C_T in ${counted(table.groups.length, 'group')}`;
   return [
     h('p', {class: 'origin unknown'},
       'A table of observations made elsewhere: this program recorded none of them.'),
-    h('p', {class: 'summary'},
-      prose(
-          table.absent ?
-              `${counted(report.observations, 'observation')}.` :
-              `${counted(report.observations, 'observation')}, ${counted(table.reduced, 'value')} of C_T in ${
-                  counted(table.groups.length, 'group')}.`)),
+    h('p', {class: 'summary'}, prose(`${rows}${table.absent ? '' : groups()}.`)),
   ];
 }
 
 function head() {
   document.title = `${report.name} – tunnelrig report`;
-  return [
-    h('p', {class: 'kind'}, 'tunnelrig report'), h('h1', {}, report.name),
-    ...(report.kind === 'table' ? headOfTable() : headOfCampaign())
-  ];
+  const rest = report.kind === 'table' ? headOfTable() : headOfCampaign();
+  return [h('p', {class: 'kind'}, 'tunnelrig report'), h('h1', {}, report.name), ...rest];
 }

@@ -37,15 +37,11 @@ function usualRange(groups) {
 
 /** What is not in the curves, and what in them is not to be believed. */
 function reservations({unknown, at_rest: atRest, doubtful_lines: doubtful}) {
-  const lines = doubtful.length > 6 ? `${doubtful.slice(0, 6).join(', ')} and ${doubtful.length - 6} more` :
-                                      doubtful.join(', ');
-  return (unknown ? ` ${counted(unknown, 'row')} left out, whose speed or diameter is not known.` : '') +
-      (atRest ?
-           ` ${
-               counted(
-                   atRest, 'row')} left out, whose motor stood (below 5 % of its group's highest speed).` :
-           '') +
-      (doubtful.length ? ` More than three times off their group's median, so in doubt: line ${lines}.` : '');
+  const lines = doubtful.slice(0, 6).join(', ') + (doubtful.length > 6 ? ' and more' : '');
+  return sentences(
+      unknown && `${counted(unknown, 'row')} left out, whose speed or diameter is not known.`,
+      atRest && `${counted(atRest, 'row')} left out, whose motor stood.`,
+      lines && `In doubt, being far off the rest of their group: lines ${lines}.`);
 }
 
 function drawSweeps(section, chosen) {
@@ -64,44 +60,41 @@ function drawSweeps(section, chosen) {
 }
 
 /** Groups to choose from, with a field that narrows the list. */
-function groupPicker(groups, change) {
-  const select = h('select', {
-    multiple: '',
-    size: '8',
-    'aria-label': 'Groups to show',
-    change: () => change([...select.selectedOptions].map((o) => Number(o.value)))
+function groupPicker(groups, chosen, change) {
+  const options = groups.map((group, i) => h('option', {value: i}, group.group));
+  const select = h('select', {multiple: '', size: '8', 'aria-label': 'Groups to show'}, options);
+  chosen.forEach((i) => {
+    options[i].selected = true;
   });
-  const fill = (part) => select.replaceChildren(...groups.flatMap(
-      (g, i) =>
-          (g.group.toLowerCase().includes(part.toLowerCase()) ? [h('option', {value: i}, g.group)] : [])));
-  fill('');
-  for (const option of [...select.options].slice(0, Math.min(3, groups.length))) option.selected = true;
-  const filter = h('input', {type: 'search', placeholder: 'part of a name', input: () => fill(filter.value)});
-  return h(
-      'div', {class: 'picker'}, h('label', {}, 'Filter ', filter), select,
-      h('p', {class: 'soft'}, `Choose up to ${kFew}: hold Ctrl (⌘) or Shift for more than one.`));
+  select.addEventListener(
+      'change', () => change([...select.selectedOptions].map((option) => Number(option.value))));
+  const filter = h('input', {type: 'search', placeholder: 'part of a name'});
+  filter.addEventListener('input', () => {
+    const part = filter.value.toLowerCase();
+    select.replaceChildren(...options.filter((option) => option.text.toLowerCase().includes(part)));
+  });
+  const how = `Choose up to ${kFew}: hold Ctrl (⌘) or Shift for more than one.`;
+  return h('div', {class: 'picker'}, h('label', {}, 'Filter ', filter), select, h('p', {class: 'soft'}, how));
 }
 
 function sweepFigure(section) {
-  const {groups} = section;
+  const {groups, response, response_unit: unit, convention} = section;
   let chosen = groups.slice(0, 3).map((_, i) => i);
   const place = plot(
       'C_T against speed by group; the table beneath has a summary', (width) => (isNarrow(width) ? 460 : 500),
       () => drawSweeps(section, chosen));
-  const picker = groups.length > 1 ? groupPicker(groups, (now) => {
+  const picker = groupPicker(groups, chosen, (now) => {
     chosen = now;
     redraw(place);
-  }) : [];
+  });
+  const caption = sentences(
+      `C_T of one rotor, from the column ${response}${response.includes(unit) ? '' : ` [${unit}]`},`,
+      `in the ${convention} convention. Faint lines: all groups; one row in a hundred lies outside`,
+      'the picture (double-click to see all). A table carries no repeats of its own, so there are no',
+      'error bars: the scatter along a curve is what is known.', reservations(section));
+  const content = groups.length > 1 ? h('div', {class: 'with-picker'}, picker, place) : place;
   return figure(
-      'Thrust coefficient against speed', [], h('div', {class: 'with-picker'}, picker, place),
-      `C_T of one rotor, from the column ${section.response}${
-          section.response.includes(section.response_unit) ?
-              '' :
-              ` [${section.response_unit}]`}, speed, diameter and air of each row, in the ${
-          section.convention} ` +
-          'convention. Faint lines: all groups; one row in a hundred lies outside the picture (double-click to see all). A table carries no repeats of its own, so there are no error bars: the scatter along a curve is what is known.' +
-          reservations(section),
-      command('reduce', '--csv coefficients.csv'));
+      'Thrust coefficient against speed', [], content, caption, command('reduce', '--csv coefficients.csv'));
 }
 
 const sweepTable = (groups) => table(

@@ -48,6 +48,8 @@ const axis = (title, more = {}) => ({
   ...more,
 });
 
+const heightTitle = '← ground  z̄ = 2z/(h<sub>t</sub> − h<sub>q</sub>)  ceiling →';
+
 const isNarrow = (width) => width < 560;
 
 /** What all plots share; `legend` stands on the right, below on narrow pages. */
