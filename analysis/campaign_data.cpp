@@ -51,6 +51,18 @@ CampaignData read_campaign_data(const CampaignFile& file) {
   return data;
 }
 
+void read_run_windows(const CampaignFile& file, CampaignData& data) {
+  auto windows = all_statistics(file);
+  read_windows(file, windows);
+  for (const auto& [name, raw] : data.raw) {
+    const auto from = windows.find(raw.id);
+    const auto to = data.statistics.find(name);
+    if (from == windows.end() || to == data.statistics.end()) continue;
+    to->second.window_s = from->second.window_s;
+    to->second.window_means_V = std::move(from->second.window_means_V);
+  }
+}
+
 std::map<std::string, RunStatistics> statistics_from_raw(
     const std::filesystem::path& path, bool with_spectrum,
     const std::function<void(std::size_t, std::size_t)>& progress) {

@@ -28,6 +28,9 @@ struct CampaignData {
 /// Reads everything but raw data and windows.
 CampaignData read_campaign_data(const CampaignFile& file);
 
+/// Adds the windows within every run to the statistics.
+void read_run_windows(const CampaignFile& file, CampaignData& data);
+
 /// Computes the statistics of every raw run again from its frames, on two threads. `progress` is called with
 /// done and total. Throws StorageError where raw data are damaged.
 std::map<std::string, RunStatistics> statistics_from_raw(

@@ -1,0 +1,93 @@
+// What a candidate effect is: a formula that changes a rotor's force, its parameters with bounds, and the
+// measured conditions that it needs. One file each beside this one; docs/effects.md shows how to add another.
+#pragma once
+
+#include "datasets/campaign.h"
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <ceres/jet.h>
+
+namespace tunnelrig {
+
+inline constexpr int kMaxEffectParameters = 3;
+using EffectJet = ceres::Jet<double, kMaxEffectParameters>;
+
+/// What a formula may look at: one rotor of one run, at one time within the run.
+struct Sample {
+  std::span<const double> x;          // the effect's covariates, in the order in which it names them
+  std::span<const double> reference;  // their typical values in the campaign (medians; kept when adopted)
+  double time_s = 0;                  // since the run's first frame
+  double previous_N = 0;  // predicted force of the run before, same rotor and session; NaN for the first
+  double other_N = 0;     // predicted force of the rotor that leaks into this one (crosstalk)
+  double newtons_per_volt = 1;  // of the cell; 1 where the campaign gives forces
+  const Rig* rig = nullptr;
+};
+
+/// A parameter's role decides how it is found.
+enum class ParameterRole {
+  kAmplitude,    // the first one; 0 means that the effect is absent
+  kShape,        // a time constant or length: tried on a grid, then refined
+  kChangePoint,  // a run's number: tried at every run that leaves enough sessions on both sides
+};
+
+struct EffectParameter {
+  std::string name, unit;
+  double lower = 0, upper = 0;  // physical bounds, in the unit
+  ParameterRole role = ParameterRole::kAmplitude;
+  std::vector<double> grid;      // kShape: where the search begins
+  std::optional<double> theory;  // the value that known physics gives it
+};
+
+/// Where an effect acts, and so in which ways it is tried.
+enum class EffectScope {
+  kShared,  // on all rotors alike: air, supply, tunnel
+  kRotor,   // on all alike, or on one rotor or cell alone
+  kPair,    // from one rotor's cell into another's
+};
+
+struct Effect {
+  std::string name;     // as docs/effects.md lists it; forms of one effect share it
+  std::string form;     // which form; empty where there is one
+  std::string formula;  // with F, the force without the effect
+  std::string physics;  // one line, with its source
+  std::vector<EffectParameter> parameters;
+  std::vector<std::string> covariates;  // columns of runs.csv, or derived ones (docs/effects.md)
+  EffectScope scope = EffectScope::kShared;
+  bool tunnel_only = false;  // acts at tunnel locations only
+  bool theory_only = false;  // the amplitude is theory's whenever the effect is adopted
+  bool additive = false;     // adds a force, where others scale it
+  bool needs_previous = false;
+  std::string sign_rule;  // what the bounds of the amplitude mean, in words
+
+  std::function<double(const Sample&, const double*, double)> force_N;
+  std::function<EffectJet(const Sample&, const EffectJet*, const EffectJet&)> jet_N;
+
+  bool within_time() const;       // changes within a run
+  bool has_change_point() const;  // begins at some run
+  std::optional<double> theory() const { return parameters[0].theory; }
+};
+
+/// Completes a description by its formula: a functor `T operator()(const Sample&, const T* p, const T& F)
+/// const`.
+template <class Formula>
+Effect make_effect(Effect description) {
+  description.force_N = [](const Sample& s, const double* p, double force) { return Formula()(s, p, force); };
+  description.jet_N = [](const Sample& s, const EffectJet* p, const EffectJet& force) {
+    return Formula()(s, p, force);
+  };
+  return description;
+}
+
+/// 2 s to half an hour, five values a decade: time constants that a run or a session can show.
+std::vector<double> time_constants_s();
+
+/// Every candidate of this folder, forms of one effect next to each other.
+const std::vector<Effect>& all_effects();
+
+}  // namespace tunnelrig

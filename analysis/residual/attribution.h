@@ -1,0 +1,67 @@
+// From residuals to named effects: the search, on the runs that are not sealed. docs/closed-loop.md has the protocol.
+#pragma once
+
+#include "analysis/residual/joint_fit.h"
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace tunnelrig {
+
+struct SearchSettings {
+  double alpha = 0.02;
+  int most_effects = 4;
+  int most_curves = 3;
+  std::size_t simulations = 999;
+  std::uint64_t seed = 1;
+  double session_ratio = 2;  // session scatter is an unknown where σ_session/σ_run is above it beyond doubt
+  std::function<void(const std::string&)> progress = [](const std::string&) {};
+};
+
+/// One line of a ranking.
+struct Ranked {
+  Term term;
+  double evidence = 0;  // −log10 p of its own
+  double p = 1;         // by the maximum over all candidates
+  double amplitude = 0, standard_error = 0;
+};
+
+/// What one round of the search saw.
+struct Round {
+  std::vector<Ranked> ranking;      // best way of each effect, best first
+  std::vector<double> null_maxima;  // what the largest evidence is where there is no effect
+  double critical = 0;              // evidence that α asks for
+  std::string outcome;              // in words: what was accepted, or why not
+};
+
+struct Accepted {
+  Term term;
+  double p = 1;
+  double gain = 0;       // fall of the leave-one-block-out error, response's unit
+  double loss_gain = 0, loss_standard_error = 0;
+  std::vector<Ranked> confounded;  // one way of each effect that does as well
+};
+
+struct FoundCurve {
+  Curve curve;
+  double p = 1;
+};
+
+struct Attribution {
+  std::vector<Accepted> accepted;
+  std::vector<FoundCurve> curves;
+  bool session_unknown = false;
+  JointFit baseline, final;  // without and with the accepted terms and curves
+  std::vector<Round> rounds, curve_rounds;
+  double detectable_sigma = 0;  // rms of an effect, in y, that is found at 80 % power
+};
+
+/// Candidates that can be tried, each in all its ways.
+std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations, const std::vector<int>& rows);
+
+Attribution attribute(const Observations& observations, const std::vector<int>& rows, const std::vector<const Effect*>& effects,
+                      const SearchSettings& settings);
+
+}  // namespace tunnelrig

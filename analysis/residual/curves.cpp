@@ -1,0 +1,79 @@
+#include "analysis/residual/curves.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr int kMostBends = 6;
+
+Components nothing(const Observations& observations) {
+  return Components(1 + observations.shape.size(), MatrixXd::Zero(observations.rows(), observations.channels()));
+}
+
+/// cos(π k u), u = 0 … 1 over the covariate's range: bends of ever shorter length.
+std::vector<Components> bends(const Observations& observations, const Covariate& covariate, int rotor, int count) {
+  const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff();
+  std::vector<Components> columns;
+  for (int k = 1; k <= count; ++k) {
+    columns.push_back(nothing(observations));
+    for (Index row = 0; row < observations.rows(); ++row)
+      for (Index channel = 0; channel < observations.channels(); ++channel)
+        if (rotor < 0 || channel == rotor)
+          columns.back()[0](row, channel) = std::cos(std::numbers::pi * k * (covariate.at(row, channel) - low) / (high - low));
+  }
+  return columns;
+}
+
+std::vector<Components> course(const Observations& observations, int rotor) {
+  std::vector<Components> columns;
+  for (std::size_t j = 1; j <= observations.shape.size(); ++j) {
+    columns.push_back(nothing(observations));
+    for (Index channel = 0; channel < observations.channels(); ++channel)
+      if (rotor < 0 || channel == rotor) columns.back()[j].col(channel).setConstant(1);
+  }
+  return columns;
+}
+
+int different_values(const Covariate& covariate, const std::vector<int>& rows) {
+  std::set<double> values;
+  for (const int row : rows) values.insert(covariate.value(row, 0));
+  return static_cast<int>(values.size());
+}
+
+std::string reported_name(const std::string& covariate) { return covariate == "hours_in_session" ? "start_utc" : covariate; }
+
+}  // namespace
+
+std::string Curve::label() const {
+  return rotor < 0 ? covariate : covariate + fmt::format(" of rotor {}", rotor + 1);
+}
+
+std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows) {
+  std::vector<int> rotors = {-1};
+  for (int rotor = 0; rotor < static_cast<int>(observations.channels()) && observations.channels() > 1; ++rotor) rotors.push_back(rotor);
+  std::vector<Curve> curves;
+  for (const Covariate& covariate : observations.covariates) {
+    if (observations.not_usable.contains(covariate.name) || covariate.value.array().isNaN().any()) continue;
+    if (!(covariate.value.maxCoeff() > covariate.value.minCoeff())) continue;
+    const int count = std::min(kMostBends, different_values(covariate, rows) / 3);
+    if (count < 1) continue;
+    for (const int rotor : rotors)
+      curves.push_back({reported_name(covariate.name), rotor, bends(observations, covariate, rotor, count), covariate.value});
+  }
+  if (!observations.shape.empty())
+    for (const int rotor : rotors) curves.push_back({"time_in_run", rotor, course(observations, rotor), {}});
+  return curves;
+}
+
+Candidate as_candidate(const Curve& curve) { return {.columns = curve.columns, .sign = 0, .weight = 1}; }
+
+}  // namespace tunnelrig

@@ -1,0 +1,91 @@
+// What the closed loop says of a campaign: the answer, and what it rests on.
+#pragma once
+
+#include "analysis/residual/attribution.h"
+#include "analysis/residual/seal.h"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tunnelrig {
+
+struct ErrorEstimate {
+  double rmse = 0;           // of the fitted runs
+  double held_out_rmse = 0;  // of the sealed runs
+  double held_out_low = 0, held_out_high = 0;
+};
+
+struct ParameterEstimate {
+  std::string name, unit;
+  double value = 0, low = 0, high = 0;  // 95 %
+  bool theory = false;                  // the value is known physics; the interval is what the data say
+};
+
+/// The run that would tell confounded effects apart.
+struct SeparatingRun {
+  std::map<std::string, double> setting;  // covariates to set
+  std::string location;                   // empty: any
+  double expected_sigma = 0;              // distance of the predictions over the scatter of one run
+  std::string text;
+};
+
+struct AdoptedEffect {
+  Term term;
+  std::vector<ParameterEstimate> parameters;
+  double p_value = 1;
+  double held_out_gain = 0;  // unit of the response
+  std::vector<std::string> confounded_with;
+  std::optional<SeparatingRun> separating_run;
+};
+
+struct ShapePoint {
+  double x = 0, y = 0, low = 0, high = 0;  // y in the response's unit
+};
+
+struct UnknownStructure {
+  std::string covariate;  // as runs.csv has it, or session, run_order, time_in_run
+  int rotor = -1;
+  double p_value = 1;
+  double amplitude = 0;  // half of peak to peak, unit of the response
+  std::vector<ShapePoint> shape;
+};
+
+struct Untestable {
+  std::string effect, reason;
+  std::vector<std::string> missing;
+};
+
+struct SuspectRow {
+  std::string row;
+  double studentised = 0;
+};
+
+struct Explanation {
+  std::string campaign, response, unit, baseline, verdict;
+  double noise_floor = 0;
+  int blocks = 0, runs = 0;
+  ErrorEstimate before, after;
+  std::vector<AdoptedEffect> adopted;
+  std::vector<UnknownStructure> unknown;
+  std::vector<Untestable> untestable;
+  std::vector<SuspectRow> suspect_rows;
+  std::vector<std::string> warnings;
+  double detectable = 0;
+
+  // what the pages show beside it
+  std::vector<Round> rounds, curve_rounds;
+  std::vector<std::vector<std::string>> residual_plots;
+  MeanModel model;  // fitted to all runs
+  Eigen::MatrixXd residual_before, residual_after;  // n × c, unit of the response
+};
+
+/// The protocol: seal, search on the open runs, open the seal once, estimate on all.
+Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects, const SearchSettings& settings);
+
+/// The setting that tells `first` from `second` best, among conditions the rig has nearly seen.
+std::optional<SeparatingRun> separating_run(const Observations& observations, const Term& first, const Term& second,
+                                            const JointFit& fit, const std::vector<int>& rows);
+
+}  // namespace tunnelrig

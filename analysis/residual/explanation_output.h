@@ -1,0 +1,23 @@
+// The explanation for machines and for people.
+#pragma once
+
+#include "analysis/residual/explanation.h"
+
+#include <string>
+
+namespace tunnelrig {
+
+/// "tunnelrig-explain/1"; field names are a contract (docs/closed-loop.md). Every number is finite.
+std::string explanation_json(const Explanation& explanation);
+
+/// Plain text, what a person reads on a terminal.
+std::string explanation_text(const Explanation& explanation);
+
+/// One self-contained page: residuals against covariates before and after, the ranking, null distributions.
+std::string explanation_html(const Explanation& explanation, const Observations& observations);
+
+/// Every candidate with formula, parameters, what it needs, and whether these data can test it (null: no data).
+std::string candidates_text(const std::vector<const Effect*>& effects, const Observations* observations);
+std::string candidates_json(const std::vector<const Effect*>& effects, const Observations* observations);
+
+}  // namespace tunnelrig

@@ -1,0 +1,186 @@
+#include "analysis/residual/held_out.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kMostFolds = 24;
+
+/// What the fit leaves for prediction: everything stratum by stratum.
+struct Fit {
+  VectorXd amplitude;
+  MatrixXd covariance;                // of the amplitudes
+  std::vector<Stacked> y, columns;    // of the fitted runs
+};
+
+Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vector<const Components*>& items, const NullFit& null) {
+  const Index k = static_cast<Index>(items.size());
+  Fit fit{VectorXd::Zero(k), MatrixXd::Zero(k, k), {}, {}};
+  MatrixXd a = MatrixXd::Zero(k, k);
+  VectorXd b = VectorXd::Zero(k);
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
+    fit.y.push_back(model.stack(s, {&y}));
+    fit.columns.push_back(model.stack(s, items));
+    if (k == 0) continue;
+    Stacked projected_y = fit.y[s], projected = fit.columns[s];
+    model.project(s, null.ratio[s], projected_y);
+    model.project(s, null.ratio[s], projected);
+    const double weight = 1 / std::max(null.sigma[s] * null.sigma[s], 1e-300);
+    a += weight * projected.transpose() * projected;
+    b += weight * projected.transpose() * projected_y.col(0);
+  }
+  if (k == 0) return fit;
+  // Collinear columns share their amplitude instead of running away.
+  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(a);
+  fit.amplitude = solver.solve(b);
+  fit.covariance = solver.pseudoInverse();
+  return fit;
+}
+
+/// Where whole groups are held out, a group's constant is the mean over every other run of it; the rest is scored.
+/// `residual` came with NaN there because the model has no such group: `plain` is the same without any baseline.
+void own_constants(const Observations& observations, const std::vector<int>& rows, const MatrixXd& plain, double sigma2,
+                   MatrixXd& residual, MatrixXd& variance) {
+  std::map<int, std::vector<Index>> runs;
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    if (std::isnan(residual(static_cast<Index>(r), 0)))
+      runs[observations.group[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
+  for (const auto& [group, members] : runs) {
+    Eigen::RowVectorXd constant = Eigen::RowVectorXd::Zero(plain.cols());
+    const double used = static_cast<double>((members.size() + 1) / 2);
+    for (std::size_t m = 0; m < members.size(); m += 2) constant += plain.row(members[m]) / used;
+    for (std::size_t m = 1; m < members.size(); m += 2) {
+      residual.row(members[m]) = plain.row(members[m]) - constant;
+      variance.row(members[m]).setConstant(sigma2 * (1 + 1 / used));
+    }
+  }
+}
+
+/// eᵀV⁻¹e of one stratum, block by block; V = σ²(I + a 11ᵀ).
+double mahalanobis(const Observations& observations, const std::vector<int>& rows, const MatrixXd& error, double sigma, double ratio) {
+  double sum = 0;
+  for (Index mode = 0; mode < error.cols(); ++mode) {
+    std::map<int, std::array<double, 3>> blocks;  // n, Σe, Σe²
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      const double e = error(static_cast<Index>(r), mode);
+      if (std::isnan(e)) continue;
+      auto& block = blocks[observations.block[static_cast<std::size_t>(rows[r])]];
+      block[0] += 1;
+      block[1] += e;
+      block[2] += e * e;
+    }
+    for (const auto& [id, b] : blocks) sum += b[2] - ratio / (1 + ratio * b[0]) * b[1] * b[1];
+  }
+  return sum / std::max(sigma * sigma, 1e-300);
+}
+
+}  // namespace
+
+double HeldOutErrors::sum_of_squares() const {
+  return error.array().isNaN().select(0, error).squaredNorm();
+}
+
+Index HeldOutErrors::count() const { return error.size() - error.array().isNaN().count(); }
+
+AmplitudeFit fit_amplitudes(const Observations& observations, const Components& y, const std::vector<Components>& columns,
+                            const NullFit& null, const std::vector<int>& rows) {
+  std::vector<const Components*> items;
+  for (const Components& column : columns) items.push_back(&column);
+  const Fit fit = fit_amplitudes(MixedModel(observations, rows, null.ratio), y, items, null);
+  return {fit.amplitude, fit.covariance};
+}
+
+HeldOutErrors predict_held_out(const Observations& observations, const Components& y, const std::vector<Components>& columns,
+                               const NullFit& null, const std::vector<int>& fit_rows, const std::vector<int>& test_rows) {
+  const MixedModel model(observations, fit_rows, null.ratio);
+  const MixedModel test(observations, test_rows, {0});
+  std::vector<const Components*> items;
+  for (const Components& column : columns) items.push_back(&column);
+  const Fit fit = fit_amplitudes(model, y, items, null);
+  const Index n = static_cast<Index>(test_rows.size()), c = observations.channels();
+  HeldOutErrors result{test_rows, MatrixXd::Zero(n, c), MatrixXd::Zero(n, c), 0, fit.amplitude};
+  MatrixXd error_by_mode = MatrixXd::Zero(n, c), variance_by_mode = MatrixXd::Zero(n, c);
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
+    const MixedModel::Stratum& stratum = model.strata()[s];
+    const double sigma2 = null.sigma[s] * null.sigma[s];
+    Stacked plain = test.stack(s, {&y});
+    Stacked residual = plain - model.baseline_prediction(s, null.ratio[s], fit.y[s], test_rows);
+    Stacked variance = Stacked::Constant(residual.rows(), 1, 1 + kRatios[null.ratio[s]]);
+    variance += model.baseline_variance(s, null.ratio[s], test_rows).replicate(stratum.modes, 1);
+    variance *= sigma2;
+    if (!items.empty()) {
+      const Stacked stacked = test.stack(s, items);
+      const Stacked x = stacked - model.baseline_prediction(s, null.ratio[s], fit.columns[s], test_rows);
+      plain -= stacked * fit.amplitude;
+      residual -= x * fit.amplitude;
+      variance += ((x * fit.covariance).array() * x.array()).rowwise().sum().matrix();
+    }
+    MatrixXd errors = Eigen::Map<const MatrixXd>(residual.data(), n, stratum.modes);
+    MatrixXd variances = Eigen::Map<const MatrixXd>(variance.data(), n, stratum.modes);
+    if (stratum.means() && observations.groups_within_blocks)
+      own_constants(observations, test_rows, Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes), sigma2, errors, variances);
+    result.loss += mahalanobis(observations, test_rows, errors, null.sigma[s], kRatios[null.ratio[s]]);
+    if (!stratum.means()) continue;
+    error_by_mode.middleCols(stratum.first_mode, stratum.modes) = errors;
+    variance_by_mode.middleCols(stratum.first_mode, stratum.modes) = variances;
+  }
+  const MatrixXd error_y = error_by_mode * model.mode_matrix().transpose();
+  const MatrixXd std_y = (variance_by_mode * model.mode_matrix().transpose().cwiseAbs2()).cwiseSqrt();
+  for (Index r = 0; r < n; ++r)
+    for (Index channel = 0; channel < c; ++channel) {
+      const double value = observations.value(test_rows[static_cast<std::size_t>(r)], channel);
+      const double predicted = observations.multiplicative ? value * std::exp(-error_y(r, channel)) : value - error_y(r, channel);
+      result.error(r, channel) = predicted - value;
+      result.expected_std(r, channel) = (observations.multiplicative ? std::abs(predicted) : 1) * std_y(r, channel);
+    }
+  return result;
+}
+
+CrossValidation cross_validate(const Observations& observations, const Components& y, const std::vector<Components>& columns,
+                               const NullFit& null, const std::vector<int>& rows) {
+  std::map<int, std::size_t> fold_of;
+  for (const int row : rows) fold_of.emplace(observations.block[static_cast<std::size_t>(row)], 0);
+  std::size_t next = 0;
+  for (auto& [block, fold] : fold_of) fold = next++ % kMostFolds;
+  CrossValidation result;
+  for (std::size_t fold = 0; fold < std::min(fold_of.size(), kMostFolds); ++fold) {
+    std::vector<int> fit, test;
+    for (const int row : rows) (fold_of.at(observations.block[static_cast<std::size_t>(row)]) == fold ? test : fit).push_back(row);
+    result.folds.push_back(predict_held_out(observations, y, columns, null, fit, test));
+  }
+  return result;
+}
+
+double CrossValidation::rmse() const {
+  double squares = 0;
+  Index count = 0;
+  for (const HeldOutErrors& fold : folds) {
+    squares += fold.sum_of_squares();
+    count += fold.count();
+  }
+  return count == 0 ? kNaN : std::sqrt(squares / static_cast<double>(count));
+}
+
+VectorXd CrossValidation::losses() const {
+  VectorXd result(static_cast<Index>(folds.size()));
+  for (std::size_t fold = 0; fold < folds.size(); ++fold) result(static_cast<Index>(fold)) = folds[fold].loss;
+  return result;
+}
+
+LossDifference compare(const CrossValidation& worse, const CrossValidation& better) {
+  const VectorXd difference = worse.losses() - better.losses();
+  const double n = static_cast<double>(difference.size());
+  const double mean = difference.mean();
+  return {mean, std::sqrt((difference.array() - mean).square().sum() / (n * (n - 1)))};
+}
+
+}  // namespace tunnelrig

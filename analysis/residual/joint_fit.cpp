@@ -1,0 +1,221 @@
+#include "analysis/residual/joint_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <ceres/ceres.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Where a parameter of the model stands.
+struct FreeParameter {
+  std::size_t term = 0, parameter = 0;
+};
+
+bool is_free(const Term& term, std::size_t k) {
+  const EffectParameter& parameter = term.effect->parameters[k];
+  if (parameter.role == ParameterRole::kChangePoint) return false;
+  return !(k == 0 && term.at_theory);
+}
+
+std::vector<FreeParameter> free_parameters(const MeanModel& model) {
+  std::vector<FreeParameter> result;
+  for (std::size_t t = 0; t < model.terms.size(); ++t)
+    for (std::size_t k = 0; k < model.terms[t].parameters.size(); ++k)
+      if (is_free(model.terms[t], k)) result.push_back({t, k});
+  return result;
+}
+
+/// All strata below each other, whitened, over σ, without what baseline and curves can absorb.
+class Whitener {
+ public:
+  Whitener(const MixedModel& model, const NullFit& null, const std::vector<Curve>& curves) : model_(model), null_(null) {
+    std::vector<const Components*> items;
+    for (const Curve& curve : curves)
+      for (const Components& column : curve.columns) items.push_back(&column);
+    if (items.empty()) return;
+    const MatrixXd columns = plain(items);
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(columns);
+    basis_ = qr.householderQ() * MatrixXd::Identity(columns.rows(), qr.rank());
+  }
+
+  MatrixXd operator()(const std::vector<const Components*>& items) const {
+    MatrixXd result = plain(items);
+    if (basis_.cols() > 0) result -= basis_ * (basis_.transpose() * result);
+    return result;
+  }
+
+ private:
+  MatrixXd plain(const std::vector<const Components*>& items) const {
+    std::vector<Stacked> parts;
+    Index rows = 0;
+    for (std::size_t s = 0; s < model_.strata().size(); ++s) {
+      parts.push_back(model_.stack(s, items));
+      model_.project(s, null_.ratio[s], parts.back());
+      parts.back() /= std::max(null_.sigma[s], 1e-300);
+      rows += parts.back().rows();
+    }
+    MatrixXd result(rows, static_cast<Index>(items.size()));
+    Index at = 0;
+    for (const Stacked& part : parts) {
+      result.middleRows(at, part.rows()) = part;
+      at += part.rows();
+    }
+    return result;
+  }
+
+  const MixedModel& model_;
+  const NullFit& null_;
+  MatrixXd basis_;
+};
+
+/// R(y − Σ terms) and its derivatives by the free parameters.
+class Residuals : public ceres::CostFunction {
+ public:
+  Residuals(const Observations& observations, const MeanModel& start, const Whitener& whitener, const MatrixXd& predicted)
+      : observations_(observations), model_(start), free_(free_parameters(start)), whitener_(whitener), predicted_(predicted) {
+    const Components y = response_components(observations);
+    y_ = whitener_({&y}).col(0);
+    set_num_residuals(static_cast<int>(y_.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(free_.size()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    MeanModel model = model_;
+    for (std::size_t i = 0; i < free_.size(); ++i) model.terms[free_[i].term].parameters[free_[i].parameter] = parameters[0][i];
+    const LinearModel linear = linearise(observations_, {model.terms, {}}, predicted_);
+    std::vector<const Components*> items = {&linear.offset};
+    for (const Components& column : linear.columns) items.push_back(&column);
+    const MatrixXd whitened = whitener_(items);
+    Eigen::Map<VectorXd>(residuals, y_.size()) = y_ - whitened.col(0);
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+          jacobians[0], y_.size(), static_cast<Index>(free_.size())) = -whitened.rightCols(static_cast<Index>(free_.size()));
+    }
+    return Eigen::Map<VectorXd>(residuals, y_.size()).allFinite();
+  }
+
+ private:
+  const Observations& observations_;
+  MeanModel model_;
+  std::vector<FreeParameter> free_;
+  const Whitener& whitener_;
+  const MatrixXd& predicted_;
+  VectorXd y_;
+};
+
+bool solve(const Observations& observations, MeanModel& model, const Whitener& whitener, const MatrixXd& predicted) {
+  const std::vector<FreeParameter> free = free_parameters(model);
+  if (free.empty()) return true;
+  std::vector<double> values;
+  for (const FreeParameter& f : free) values.push_back(model.terms[f.term].parameters[f.parameter]);
+  ceres::Problem problem;
+  problem.AddResidualBlock(new Residuals(observations, model, whitener, predicted), nullptr, values.data());
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    const EffectParameter& parameter = model.terms[free[i].term].effect->parameters[free[i].parameter];
+    values[i] = std::clamp(values[i], parameter.lower, parameter.upper);
+    problem.SetParameterLowerBound(values.data(), static_cast<int>(i), parameter.lower);
+    problem.SetParameterUpperBound(values.data(), static_cast<int>(i), parameter.upper);
+  }
+  ceres::Solver::Options options;
+  options.max_num_iterations = 40;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.function_tolerance = 1e-9;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  for (std::size_t i = 0; i < free.size(); ++i) model.terms[free[i].term].parameters[free[i].parameter] = values[i];
+  return summary.IsSolutionUsable();
+}
+
+}  // namespace
+
+Components response_components(const Observations& observations) {
+  Components result = {observations.y};
+  result.insert(result.end(), observations.shape.begin(), observations.shape.end());
+  return result;
+}
+
+Components difference(const Components& a, const Components& b) {
+  Components result = a;
+  for (std::size_t k = 0; k < result.size(); ++k) result[k] -= b[k];
+  return result;
+}
+
+MatrixXd predict_response(const Observations& observations, const MeanModel& model, const std::vector<int>& rows) {
+  MatrixXd predicted = observations.value;  // only to begin with: replaced by the constants' prediction below
+  for (int pass = 0; pass < 2; ++pass) {
+    MatrixXd residual = observations.y;
+    MatrixXd added = MatrixXd::Zero(residual.rows(), residual.cols());
+    if (pass > 0)
+      for (const Term& term : model.terms) added += respond(term, observations, predicted).value[0];
+    residual -= added;
+    MatrixXd sum = MatrixXd::Zero(observations.groups(), residual.cols());
+    VectorXd count = VectorXd::Zero(observations.groups());
+    for (const int row : rows) {
+      sum.row(observations.group[static_cast<std::size_t>(row)]) += residual.row(row);
+      count(observations.group[static_cast<std::size_t>(row)]) += 1;
+    }
+    const Eigen::RowVectorXd overall = sum.colwise().sum() / count.sum();
+    for (Index row = 0; row < residual.rows(); ++row) {
+      const Index group = observations.group[static_cast<std::size_t>(row)];
+      const Eigen::RowVectorXd constant = count(group) > 0 ? Eigen::RowVectorXd(sum.row(group) / count(group)) : overall;
+      predicted.row(row) = observations.multiplicative
+                               ? Eigen::RowVectorXd(observations.known.row(row).array() * (constant + added.row(row)).array().exp())
+                               : Eigen::RowVectorXd(constant + added.row(row));
+    }
+  }
+  return predicted;
+}
+
+LinearModel linearise(const Observations& observations, const MeanModel& model, const MatrixXd& predicted) {
+  LinearModel linear{Components(1 + observations.shape.size(), MatrixXd::Zero(observations.rows(), observations.channels())), {}};
+  for (const Term& term : model.terms) {
+    TermResponse response = respond(term, observations, predicted);
+    for (std::size_t k = 0; k < linear.offset.size(); ++k) linear.offset[k] += response.value[k];
+    for (std::size_t k = 0; k < response.derivative.size(); ++k)
+      if (is_free(term, k)) linear.columns.push_back(std::move(response.derivative[k]));
+  }
+  for (const Curve& curve : model.curves) linear.columns.insert(linear.columns.end(), curve.columns.begin(), curve.columns.end());
+  return linear;
+}
+
+MeanModel refit(const Observations& observations, const MeanModel& start, const NullFit& variances, const std::vector<int>& rows) {
+  MeanModel model = start;
+  const MixedModel mixed(observations, rows, variances.ratio);
+  const Whitener whitener(mixed, variances, model.curves);
+  solve(observations, model, whitener, predict_response(observations, model, rows));
+  return model;
+}
+
+JointFit fit_jointly(const Observations& observations, const MeanModel& start, const std::vector<int>& rows) {
+  JointFit fit{.model = start, .linear = {}, .variances = {}, .at_bound = {}};
+  const MixedModel mixed(observations, rows);
+  const Components y = response_components(observations);
+  // Variances depend on the mean and the mean on the variances: twice round is enough, since both move little.
+  for (int round = 0; round < 2; ++round) {
+    const MatrixXd predicted = predict_response(observations, fit.model, rows);
+    fit.linear = linearise(observations, fit.model, predicted);
+    fit.variances = CandidateScan(mixed, fit.linear.columns, {}).null_fit(difference(y, fit.linear.offset));
+    const Whitener whitener(mixed, fit.variances, fit.model.curves);
+    fit.converged = solve(observations, fit.model, whitener, predicted);
+  }
+  fit.linear = linearise(observations, fit.model, predict_response(observations, fit.model, rows));
+  fit.variances = CandidateScan(mixed, fit.linear.columns, {}).null_fit(difference(y, fit.linear.offset));
+  for (const FreeParameter& f : free_parameters(fit.model)) {
+    const EffectParameter& parameter = fit.model.terms[f.term].effect->parameters[f.parameter];
+    const double value = fit.model.terms[f.term].parameters[f.parameter];
+    const double margin = 1e-6 * (parameter.upper - parameter.lower);
+    if (value <= parameter.lower + margin || value >= parameter.upper - margin)
+      fit.at_bound.push_back(fit.model.terms[f.term].effect->name + " " + parameter.name);
+  }
+  return fit;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,88 @@
+// The random part of the model: runs and sessions scatter, rotors together and against each other.
+//
+//   y = (group's constant, free per rotor) + terms + session + run
+//
+// The rotors' y are rotated into one common and c − 1 difference modes; the runs' means and each cosine coefficient of
+// their course, common or difference, make a stratum with a run variance σ² and a session variance a σ² of its own.
+// docs/closed-loop.md has the equations.
+#pragma once
+
+#include "analysis/residual/terms.h"
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <random>
+#include <vector>
+
+#include <Eigen/Dense>
+
+namespace tunnelrig {
+
+/// Session variance over run variance, where it is searched.
+inline constexpr std::array<double, 9> kRatios = {0, 0.05, 0.15, 0.4, 1, 2.5, 6, 15, 60};
+
+/// Columns, each stacked over the modes of one stratum: (runs · modes) × columns.
+using Stacked = Eigen::MatrixXd;
+
+/// What is fixed by the design alone: for some runs of some observations.
+class MixedModel {
+ public:
+  struct Stratum {
+    std::size_t component = 0;  // 0: the runs' means; j: their course's j-th cosine
+    int first_mode = 0, modes = 1;
+    bool means() const { return component == 0; }
+  };
+
+  /// `ratio`: only these ratios are prepared (of each stratum); empty: all.
+  MixedModel(const Observations& observations, std::vector<int> rows, const std::vector<std::size_t>& ratio = {});
+
+  const std::vector<int>& rows() const { return rows_; }
+  const std::vector<Stratum>& strata() const { return strata_; }
+  Eigen::Index dof(std::size_t stratum) const;                         // runs · modes less the baseline's
+  double log_determinant(std::size_t stratum, std::size_t ratio) const;  // restricted likelihood's constant, ½ log(…)
+  std::size_t ratios() const { return ratios_; }                       // 1 where blocks are single rows
+
+  /// Picks the model's runs and rotates the rotors into modes; one item per column of the result.
+  Stacked stack(std::size_t stratum, const std::vector<const Components*>& items) const;
+
+  /// Whitens with the ratio and takes out what the baseline can absorb, in place.
+  void project(std::size_t stratum, std::size_t ratio, Stacked& columns) const;
+
+  /// What the baseline, fitted to stacked columns of the model's runs, predicts for other runs (stacked likewise, not
+  /// whitened). Rows whose group the model does not hold are NaN. Courses have no baseline: zero.
+  Stacked baseline_prediction(std::size_t stratum, std::size_t ratio, const Stacked& columns, const std::vector<int>& rows) const;
+
+  /// Variance of that prediction's baseline part over σ², one per run (NaN likewise).
+  Eigen::VectorXd baseline_variance(std::size_t stratum, std::size_t ratio, const std::vector<int>& rows) const;
+
+  /// Draws data without any effect: session and run scatter of the given σ and ratio. Stacked, `count` columns.
+  Stacked simulate(std::size_t stratum, const std::vector<double>& sigma, const std::vector<std::size_t>& ratio,
+                   std::mt19937_64& random) const;
+
+  /// Orthonormal, c × c; the first column is the mean's.
+  const Eigen::MatrixXd& mode_matrix() const { return modes_; }
+
+ private:
+  void prepare(std::size_t ratio);
+  Eigen::MatrixXd baseline_of(const std::vector<int>& rows) const;
+  void whiten(std::size_t ratio, Eigen::Ref<Eigen::MatrixXd> columns) const;
+
+  struct Prepared {
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;  // of the whitened baseline
+    Eigen::MatrixXd basis;                           // orthonormal
+    double log_v = 0, log_xvx = 0;                   // log|V|, log|LᵀV⁻¹L|
+  };
+
+  const Observations& observations_;
+  std::vector<int> rows_;
+  std::vector<std::vector<Eigen::Index>> blocks_;  // runs of each block, as positions in rows_
+  Eigen::MatrixXd modes_;
+  std::vector<Stratum> strata_;
+  std::size_t ratios_ = kRatios.size();
+  std::map<int, Eigen::Index> groups_;  // column of each group in the baseline
+  Eigen::Index baseline_columns_ = 0;
+  std::vector<Prepared> prepared_;  // by ratio
+};
+
+}  // namespace tunnelrig

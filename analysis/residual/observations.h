@@ -1,0 +1,81 @@
+// What the model is held against: one response per run and rotor, what is known of each run, and how runs belong together.
+#pragma once
+
+#include "analysis/campaign_data.h"
+#include "datasets/observations.h"
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace tunnelrig {
+
+/// A condition of every run: a column of the runs sheet, or one derived from it. NaN where it was not recorded.
+struct Covariate {
+  std::string name;
+  Eigen::MatrixXd value;  // runs × 1, or runs × channels where each channel has its own
+  bool derived = false;   // made here, not a column of the sheet
+
+  bool per_channel() const { return value.cols() > 1; }
+  double at(Eigen::Index run, Eigen::Index channel) const { return value(run, per_channel() ? channel : 0); }
+};
+
+/// n runs (rows of a table) by c channels (rotors; 1 for a table).
+///
+/// Where the response has one sign the model is multiplicative: `y` is the logarithm of the response over what the
+/// baseline takes as known (k_i ½ρΩ²R²A), and errors are relative. Otherwise it is additive: `y` is the response.
+struct Observations {
+  std::string campaign, response, unit, baseline;
+  bool multiplicative = true;
+  Eigen::MatrixXd value;  // n × c, in the unit
+  Eigen::MatrixXd known;  // n × c: the baseline's known factor; 1 where there is none
+  Eigen::MatrixXd y;      // n × c
+  std::vector<Eigen::MatrixXd> shape;  // J matrices n × c: cosine coefficients of the run's course; empty without raw data
+  Eigen::VectorXd duration_s;          // 0 where there is no raw data
+
+  std::vector<std::string> name;  // of each run, or "file:line" of a row
+  std::vector<int> group, block;  // baseline group (location) and block (session), from 0; blocks in order of time
+  std::vector<std::string> group_name, block_name;
+  Eigen::MatrixXd slopes;  // n × s: baseline columns beside the groups' constants
+  std::vector<std::string> slope_name;
+  std::vector<bool> in_tunnel;
+  std::vector<int> previous;  // the run before in the same session, −1 for the first
+  std::vector<bool> held_out;  // a table's hold_out expression; empty: seal blocks instead
+  bool blocks_are_rows = false;
+  bool groups_within_blocks = false;  // the block is the group: its baseline is estimated anew where it is held out
+
+  Eigen::VectorXd newtons_per_volt;  // c
+  Rig rig;
+  std::vector<Covariate> covariates;
+  std::map<std::string, std::string> not_usable;  // covariate: why (missing in some runs, constant, a text)
+  std::vector<std::string> left_out;              // "run: reason"
+
+  Eigen::Index rows() const { return y.rows(); }
+  Eigen::Index channels() const { return y.cols(); }
+  int groups() const { return static_cast<int>(group_name.size()); }
+  int blocks() const { return static_cast<int>(block_name.size()); }
+  const Covariate* find(std::string_view wanted) const {
+    for (const Covariate& covariate : covariates)
+      if (covariate.name == wanted) return &covariate;
+    return nullptr;
+  }
+};
+
+struct ObservationChoice {
+  std::string response;  // "thrust", "c_t", "cell", or a column; empty: the table's response, or thrust
+  std::string baseline;  // "thesis", "open_space"; tables: "constant", "linear:COLUMN", "power:COLUMN"; empty: default
+};
+
+/// Cosine coefficients kept of a run's course: cos(π j (t/duration)), j = 1 … kShapes.
+inline constexpr int kShapes = 6;
+
+/// All thrust runs that can be reduced, with the thesis's model. Windows of the runs are used where `data` has them.
+/// Throws InputError for a response or baseline that the campaign does not have, or a response without variation.
+Observations observe_campaign(const CampaignData& data, const ObservationChoice& choice);
+
+/// All rows. Throws InputError likewise.
+Observations observe_table(const ObservationTable& table, const ObservationChoice& choice);
+
+}  // namespace tunnelrig

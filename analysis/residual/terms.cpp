@@ -1,0 +1,220 @@
+#include "analysis/residual/terms.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// Times within a run at which an effect that changes with time is evaluated.
+constexpr int kTimes = 32;
+constexpr int kLeastBlocksBesideAStep = 3;
+
+double median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// cos(π j (t + ½)/kTimes), j = 0 … kShapes, scaled to give mean and cosine coefficients.
+const MatrixXd& cosines() {
+  static const MatrixXd table = [] {
+    MatrixXd result(kShapes + 1, kTimes);
+    for (int j = 0; j <= kShapes; ++j)
+      for (int t = 0; t < kTimes; ++t)
+        result(j, t) = (j == 0 ? 1.0 : 2.0) / kTimes * std::cos(std::numbers::pi * j * (t + 0.5) / kTimes);
+    return result;
+  }();
+  return table;
+}
+
+class Evaluation {
+ public:
+  Evaluation(const Term& term, const Observations& observations, const MatrixXd& predicted)
+      : term_(term), observations_(observations), predicted_(predicted), reference_(reference_of(*term.effect, observations)) {
+    for (const std::string& name : term.effect->covariates) covariates_.push_back(observations.find(name));
+    x_.resize(covariates_.size());
+    for (std::size_t k = 0; k < term.parameters.size(); ++k) {
+      parameters_[k] = EffectJet(term.parameters[k]);
+      if (term.effect->parameters[k].role != ParameterRole::kChangePoint) parameters_[k].v[static_cast<Index>(k)] = 1;
+    }
+    within_ = term.effect->within_time() && !observations.shape.empty();
+  }
+
+  bool applies(Index row, Index channel) const {
+    if (term_.rotor >= 0 && channel != term_.rotor) return false;
+    if (term_.effect->tunnel_only && !observations_.in_tunnel[static_cast<std::size_t>(row)]) return false;
+    return std::none_of(covariates_.begin(), covariates_.end(),
+                        [&](const Covariate* covariate) { return std::isnan(covariate->at(row, channel)); });
+  }
+
+  /// Fills one entry of every component.
+  void evaluate(Index row, Index channel, TermResponse& response) {
+    Sample sample = sample_of(row, channel);
+    const double force = predicted_(row, channel);
+    const double duration = observations_.duration_s(row);
+    if (!term_.effect->within_time() || duration == 0) {
+      put(row, channel, 0, change(sample, force), 1, response);
+      return;
+    }
+    for (int t = 0; t < kTimes; ++t) {
+      sample.time_s = duration * (t + 0.5) / kTimes;
+      const EffectJet at = change(sample, force);
+      for (std::size_t j = 0; j < (within_ ? response.value.size() : 1); ++j)
+        put(row, channel, j, at, cosines()(static_cast<Index>(j), t), response);
+    }
+  }
+
+ private:
+  Sample sample_of(Index row, Index channel) {
+    for (std::size_t k = 0; k < covariates_.size(); ++k) x_[k] = covariates_[k]->at(row, channel);
+    const int before = observations_.previous[static_cast<std::size_t>(row)];
+    return {.x = x_,
+            .reference = reference_,
+            .previous_N = before < 0 ? std::numeric_limits<double>::quiet_NaN() : predicted_(before, channel),
+            .other_N = term_.other < 0 ? 0 : predicted_(row, term_.other),
+            .newtons_per_volt = channel < observations_.newtons_per_volt.size() ? observations_.newtons_per_volt(channel) : 1,
+            .rig = &observations_.rig};
+  }
+
+  /// log(F'/F) where the model is multiplicative, F' − F where it is not.
+  EffectJet change(const Sample& sample, double force) const {
+    const EffectJet changed = term_.effect->jet_N(sample, parameters_, EffectJet(force));
+    return observations_.multiplicative ? log(changed / force) : changed - force;
+  }
+
+  static void put(Index row, Index channel, std::size_t component, const EffectJet& change, double weight, TermResponse& response) {
+    response.value[component](row, channel) += weight * change.a;
+    for (std::size_t k = 0; k < response.derivative.size(); ++k)
+      if (!response.derivative[k].empty()) response.derivative[k][component](row, channel) += weight * change.v[static_cast<Index>(k)];
+  }
+
+  const Term& term_;
+  const Observations& observations_;
+  const MatrixXd& predicted_;
+  std::vector<double> reference_;
+  std::vector<const Covariate*> covariates_;
+  std::vector<double> x_;
+  EffectJet parameters_[kMaxEffectParameters];
+  bool within_ = false;
+};
+
+/// Run numbers at which a change-point leaves enough blocks of `rows` on both sides: the first run of each block.
+std::vector<double> change_points(const Observations& observations, const std::vector<int>& rows) {
+  std::vector<int> blocks;
+  std::vector<double> first;
+  for (const int row : rows) {
+    const int block = observations.block[static_cast<std::size_t>(row)];
+    if (blocks.empty() || blocks.back() != block) {
+      blocks.push_back(block);
+      first.push_back(row);
+    }
+  }
+  if (blocks.size() < 2 * kLeastBlocksBesideAStep) return {};
+  return {first.begin() + kLeastBlocksBesideAStep, first.end() - kLeastBlocksBesideAStep + 1};
+}
+
+}  // namespace
+
+std::string Term::label() const {
+  std::string text = effect->name;
+  if (!effect->form.empty()) text += " (" + effect->form + ")";
+  if (other >= 0) text += fmt::format(" from rotor {}", other + 1);
+  if (rotor >= 0) text += fmt::format(" {} rotor {}", other >= 0 ? "to" : "of", rotor + 1);
+  if (per_group) text += " per group";
+  return text;
+}
+
+bool Term::same_way(const Term& term) const {
+  return effect == term.effect && rotor == term.rotor && other == term.other && per_group == term.per_group;
+}
+
+TermResponse respond(const Term& term, const Observations& observations, const MatrixXd& predicted) {
+  const MatrixXd zero = MatrixXd::Zero(observations.rows(), observations.channels());
+  const Components none(1 + observations.shape.size(), zero);
+  TermResponse response{none, {}};
+  for (const EffectParameter& parameter : term.effect->parameters)
+    response.derivative.push_back(parameter.role == ParameterRole::kChangePoint ? Components() : none);
+  Evaluation evaluation(term, observations, predicted);
+  for (Index row = 0; row < observations.rows(); ++row)
+    for (Index channel = 0; channel < observations.channels(); ++channel)
+      if (evaluation.applies(row, channel)) evaluation.evaluate(row, channel, response);
+  return response;
+}
+
+std::vector<double> reference_of(const Effect& effect, const Observations& observations) {
+  std::vector<double> result;
+  for (const std::string& name : effect.covariates) {
+    const Covariate* covariate = observations.find(name);
+    std::vector<double> values;
+    for (Index row = 0; covariate != nullptr && row < covariate->value.rows(); ++row)
+      if (!std::isnan(covariate->value(row, 0))) values.push_back(covariate->value(row, 0));
+    result.push_back(median(std::move(values)));
+  }
+  return result;
+}
+
+Testability testability(const Effect& effect, const Observations& observations) {
+  Testability result;
+  for (const std::string& name : effect.covariates) {
+    const Covariate* covariate = observations.find(name);
+    if (covariate == nullptr) {
+      result.missing.push_back(name);
+      continue;
+    }
+    if (const auto why = observations.not_usable.find(name); why != observations.not_usable.end())
+      result.reason = name + " is " + why->second;
+  }
+  if (effect.scope == EffectScope::kPair && observations.channels() < 2) result.reason = "the response has one channel";
+  if (effect.tunnel_only && std::none_of(observations.in_tunnel.begin(), observations.in_tunnel.end(), [](bool in) { return in; }))
+    result.reason = "no run stands in a tunnel";
+  if (effect.name == "bidirectional" && observations.multiplicative) result.reason = "the response has one sign";
+  if (effect.needs_previous && observations.blocks_are_rows) result.reason = "the rows have no order";
+  return result;
+}
+
+std::vector<Term> ways_to_try(const Effect& effect, const Observations& observations, const std::vector<int>& rows) {
+  std::vector<Term> ways = {{.effect = &effect, .parameters = std::vector<double>(effect.parameters.size(), 0.0)}};
+  const int channels = static_cast<int>(observations.channels());
+  if (effect.scope == EffectScope::kRotor && channels > 1) {
+    for (int rotor = 0; rotor < channels; ++rotor) {
+      ways.push_back(ways[0]);
+      ways.back().rotor = rotor;
+    }
+  }
+  if (effect.scope == EffectScope::kPair) {
+    const Term blank = ways[0];
+    ways.clear();
+    for (int to = 0; to < channels; ++to)
+      for (int from = 0; from < channels; ++from) {
+        if (to == from) continue;
+        ways.push_back(blank);
+        ways.back().rotor = to;
+        ways.back().other = from;
+      }
+  }
+  for (std::size_t k = 1; k < effect.parameters.size(); ++k) {
+    const std::vector<double> grid = effect.parameters[k].role == ParameterRole::kChangePoint
+                                         ? change_points(observations, rows)
+                                         : effect.parameters[k].grid;
+    std::vector<Term> shaped;
+    for (const Term& way : ways)
+      for (const double value : grid) {
+        shaped.push_back(way);
+        shaped.back().parameters[k] = value;
+      }
+    ways = std::move(shaped);
+  }
+  return ways;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,87 @@
+// tunnelrig explain: find the residual, trace it to the effect that the model lacks, add it, report before and after.
+#include "analysis/residual/explanation_output.h"
+#include "cli/console.h"
+#include "cli/verb.h"
+#include "datasets/error.h"
+
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig::cli {
+namespace {
+
+struct Options {
+  std::string db, response, baseline, json, html;
+  SearchSettings search;
+  bool list = false, adopt = false;
+};
+
+std::vector<const Effect*> candidates() {
+  std::vector<const Effect*> result;
+  for (const Effect& effect : all_effects()) result.push_back(&effect);
+  return result;
+}
+
+Observations observations_of_file(const Options& options) {
+  const CampaignFile file(options.db, CampaignFile::Access::kRead);
+  CampaignData data = read_campaign_data(file);
+  read_run_windows(file, data);
+  return observe_campaign(data, {options.response, options.baseline});
+}
+
+int list(const Options& options) {
+  std::optional<Observations> observations;
+  if (!options.db.empty()) observations = observations_of_file(options);
+  const Observations* given = observations ? &*observations : nullptr;
+  fmt::print("{}\n", options.json.empty() ? candidates_text(candidates(), given) : candidates_json(candidates(), given));
+  return kWell;
+}
+
+int run(Options options) {
+  if (options.list) return list(options);
+  if (options.db.empty()) throw InputError("--db is required (all but --list need a campaign)");
+  const Observations observations = observations_of_file(options);
+  ProgressBar progress("explaining");
+  double step = 0;
+  options.search.progress = [&](const std::string& what) {
+    step += 1;
+    progress.show(step, step + 3, what);
+  };
+  const Explanation explanation = explain(observations, candidates(), options.search);
+  for (const std::string& warning : explanation.warnings) warn(warning);
+  const std::string json = explanation_json(explanation);
+  if (options.json == "-")
+    fmt::print("{}\n", json);
+  else
+    fmt::print("{}", explanation_text(explanation));
+  if (!options.json.empty() && options.json != "-") write_text(options.json, json + "\n");
+  return kWell;
+}
+
+}  // namespace
+
+void add_explain(CLI::App& app, Work& work) {
+  auto options = std::make_shared<Options>();
+  CLI::App* verb = app.add_subcommand("explain", "Trace the residual to the effect that the model lacks");
+  verb->footer(
+      "Seals a quarter of the sessions, searches on the rest, opens the seal once; docs/closed-loop.md.\n\n"
+      "Examples: tunnelrig explain --db my.db\n"
+      "          tunnelrig explain --db my.db --json explanation.json --html explanation.html\n"
+      "          tunnelrig explain --list --db my.db");
+  verb->add_option("--db", options->db, "Campaign file");
+  verb->add_option("--response", options->response, "thrust, c_t, cell, or a column")->option_text("NAME");
+  verb->add_option("--baseline", options->baseline, "thesis, open_space; tables: constant, linear:COLUMN, power:COLUMN");
+  verb->add_option("--max-effects", options->search.most_effects, "At most so many effects")->check(CLI::Range(0, 12))->capture_default_str();
+  verb->add_option("--alpha", options->search.alpha, "Chance of a name where there is no effect")->check(CLI::Range(0.001, 0.5))->capture_default_str();
+  verb->add_option("--simulations", options->search.simulations, "Data sets without effect to compare with")->check(CLI::Range(99, 99999))->capture_default_str();
+  verb->add_option("--seed", options->search.seed, "Of seal and simulations")->capture_default_str();
+  verb->add_option("--json", options->json, "Write the explanation as JSON to this file (- for standard output)");
+  verb->add_option("--html", options->html, "Write a page with the pictures");
+  verb->add_flag("--list", options->list, "Print the candidates, and with --db whether this data can test them");
+  verb->add_flag("--adopt", options->adopt, "Store the accepted effects as the next version of the model");
+  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+}
+
+}  // namespace tunnelrig::cli
