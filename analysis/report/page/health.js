@@ -8,7 +8,7 @@ const difference = (a, b) => (known(a) && known(b) ? a - b : null);
 
 /** What is looked at of every run, one above the other on one axis of time. */
 const checks = [
-  {title: 'drift / its error', unit: ' standard errors', value: (r, i) => r.drift_z[i]},
+  {title: 'drift / its<br>error [–]', unit: ' standard errors', value: (r, i) => r.drift_z[i]},
   {title: 'clipped [%]', unit: ' % of samples clipped', value: (r, i) => perCent(r.clipped[i], r.samples[i])},
   {title: 'lost [%]', unit: ' % of frames lost', value: (r, i) => perCent(r.lost[i], r.frames[i])},
   {
@@ -34,6 +34,7 @@ function checkTrace({unit, value}, chosen, kind) {
     y: shown.map((i) => value(report.runs, i)),
     text: shown.map(runLabel),
     legendgroup: kind.name,
+    cliponaxis: false,
     hovertemplate: `%{text}<br>%{x}<br>%{y:.3~g}${unit}<extra></extra>`,
   };
 }
