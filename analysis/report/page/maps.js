@@ -13,8 +13,8 @@ const fields = {
     of: 'U',
     tells:
         'The right pair minus the left pair, over all four. Blue (negative): the right pair lifts less and the ' +
-        'vehicle rolls to the right; red: to the left. On the middle plane the map is 0 by symmetry: what all ' +
-        'locations measure there counts as an error of the rig, and is not in the map.',
+        'vehicle rolls to the right; red: to the left. On the middle plane the map is 0 by symmetry: an ' +
+        'offset measured there is taken for an error that all locations share, and is not in the map.',
   },
 };
 
