@@ -36,9 +36,9 @@ std::vector<ContourLine> without_specks(std::vector<ContourLine> lines) {
   constexpr double kSpeck = 0.15;
   std::erase_if(lines, [](const ContourLine& line) {
     const auto extent = [&line](double TunnelPoint::*axis) {
-      const auto [least, greatest] =
-          std::minmax_element(line.points.begin(), line.points.end(),
-                              [axis](const TunnelPoint& a, const TunnelPoint& b) { return a.*axis < b.*axis; });
+      const auto [least, greatest] = std::minmax_element(
+          line.points.begin(), line.points.end(),
+          [axis](const TunnelPoint& a, const TunnelPoint& b) { return a.*axis < b.*axis; });
       return (*greatest).*axis - (*least).*axis;
     };
     return std::max(extent(&TunnelPoint::y_norm), extent(&TunnelPoint::z_norm)) < kSpeck;
