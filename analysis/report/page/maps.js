@@ -159,7 +159,8 @@ function drawMap(maps, field, layerName, width) {
     layout: {
       xaxis: axis('← wall  ȳ = 2y/(w<sub>t</sub> − w<sub>q</sub>) [–]  wall →', side),
       yaxis: axis(heightTitle, {...side, scaleanchor: 'x'}),
-      margin: {l: 10, r: narrow ? 10 : 90, t: 30, b: narrow ? 90 : 10},
+      // Fixed: square axes, their titles and the bar's would push each other about without end.
+      margin: {...(narrow ? {l: 58, r: 14, t: 20, b: 112} : {l: 76, r: 118, t: 30, b: 60}), autoexpand: false},
     },
   };
 }
