@@ -49,8 +49,7 @@ void add_report(CLI::App& app, Work& work) {
       app.add_subcommand("report", "One self-contained page: maps, coefficients, health, provenance");
   verb->footer(
       "The page needs no network and no other file; docs/report.md. A section that the campaign has no data "
-      "for "
-      "says why. Nothing is stored in the campaign file.\n\n"
+      "for says why. Nothing is stored in the campaign file.\n\n"
       "Example: tunnelrig report --db my.db --out report.html");
   verb->add_option("--db", options->db, "Campaign file")->required();
   verb->add_option("--out", options->out, "The page (.html)")->required();

@@ -30,6 +30,22 @@ std::vector<ContourLine> lines_of_half(const std::vector<ContourLine>& lines, bo
   return parts;
 }
 
+/// Without the specks that the uncertainty has around single locations, where each pulls it down: the cross
+/// says as much.
+std::vector<ContourLine> without_specks(std::vector<ContourLine> lines) {
+  constexpr double kSpeck = 0.15;
+  std::erase_if(lines, [](const ContourLine& line) {
+    const auto extent = [&line](double TunnelPoint::*axis) {
+      const auto [least, greatest] = std::minmax_element(
+          line.points.begin(), line.points.end(),
+          [axis](const TunnelPoint& a, const TunnelPoint& b) { return a.*axis < b.*axis; });
+      return (*greatest).*axis - (*least).*axis;
+    };
+    return std::max(extent(&TunnelPoint::y_norm), extent(&TunnelPoint::z_norm)) < kSpeck;
+  });
+  return lines;
+}
+
 std::string polylines(const std::vector<ContourLine>& lines) {
   std::string out;
   for (const ContourLine& line : lines) {
@@ -104,7 +120,7 @@ std::string axes(const MapGeometry& geometry) {
       "set xlabel '← wall              ȳ = 2y / (w_t − w_q)              wall →'\n"
       "set ylabel '← ground             z̄ = 2z / (h_t − h_q)             ceiling →'\n"
       "set x2label 'y (m)' offset 0,-0.5\nset y2label 'z (m)' offset -1,0\n"
-      "set colorbox user origin screen 0.86,0.125 size screen 0.028,0.682\n",
+      "set colorbox user origin screen 0.85,0.125 size screen 0.028,0.682\n",
       y_m, z_m, nice_step(y_m / 4), nice_step(z_m / 4));
 }
 
@@ -127,10 +143,11 @@ std::string gnuplot_script(const Picture& picture, const std::string& stem) {
     return std::any_of(picture.locations.begin(), picture.locations.end(),
                        [&](const TunnelPoint& point) { return sign * point.y_norm > 0; });
   };
+  const std::vector<ContourLine> drawn = picture.diverging ? picture.lines : without_specks(picture.lines);
   std::vector<ContourLine> measured, mirrored;
   for (const bool right : {false, true}) {
     std::vector<ContourLine>& half = on_side(right ? 1 : -1) ? measured : mirrored;
-    for (ContourLine& line : lines_of_half(picture.lines, right)) half.push_back(std::move(line));
+    for (ContourLine& line : lines_of_half(drawn, right)) half.push_back(std::move(line));
   }
   const auto block = [](const char* name, const std::string& lines) {
     return fmt::format("${} << END\n{}END\n", name, lines);
@@ -141,8 +158,10 @@ std::string gnuplot_script(const Picture& picture, const std::string& stem) {
             block("mirrored", polylines(mirrored)) + block("crosses", crosses(picture.locations)) +
             block("labels", labels(place_labels(measured, picture.locations), picture.diverging));
   script += colours(picture) + axes(picture.geometry);
-  script += fmt::format("set title \"{}\\n{{/*0.8 {}{}}}\"\nset cblabel '{}' offset 1,0\n", picture.title,
-                        picture.note, mirrored.empty() ? "" : "; dashed: mirrored", picture.colour_label);
+  script += fmt::format("set title \"{}\\n{{/*0.8 {}{}}}\"\n", picture.title, picture.note,
+                        mirrored.empty() ? "" : "; dashed: mirrored");
+  // Not as cblabel, which long numbers on the bar push out of the picture.
+  script += fmt::format("set label '{}' at screen 0.975,0.466 center rotate by 90\n", picture.colour_label);
   for (const auto& [terminal, font_size] : {std::pair{"svg", 20}, std::pair{"pngcairo", 18}}) {  // look alike
     script += fmt::format(
         "set terminal {} size 1100,960 font 'sans-serif,{}'\nset output '{}.{}'\n{}unset output\n", terminal,

@@ -93,8 +93,7 @@ Json budget_section(const Material& material) {
                    [](const LocationSummary& location) { return location.c_t.standard_uncertainty > 0; })) {
     return absent(
         "Nothing in the campaign says how uncertain its C_T is: no run was repeated, and there is no raw "
-        "data "
-        "and no calibration.");
+        "data and no calibration.");
   }
   return Json::object();
 }

@@ -4,9 +4,12 @@ foreach(file package.json package-lock.json)
   configure_file(${FROM}/${file} ${TO}/${file} COPYONLY)
 endforeach()
 execute_process(
+  # npm's own patience with a network that is not there is over a minute.
   COMMAND ${NPM} ci --ignore-scripts --prefer-offline --no-audit --no-fund
+    --fetch-retries=2 --fetch-retry-mintimeout=1000 --fetch-retry-maxtimeout=4000
   WORKING_DIRECTORY ${TO} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
 if(NOT result EQUAL 0)
-  message(FATAL_ERROR "Plotly could not be fetched; the network is needed once, at the first build. npm ci said:\n${output}")
+  message(FATAL_ERROR "Plotly could not be fetched from npm. The network, or an npm cache that holds the package, is needed once, at the "
+    "first build; see analysis/report/package.json. npm ci said:\n${output}")
 endif()
 file(TOUCH ${RESULT})  # packages carry old dates, and the file must be newer than the lock

@@ -83,9 +83,8 @@ Json runs_section(const Material& material) {
 Json health_section(const Material& material) {
   if (material.data.statistics.empty()) {
     return absent(
-        "The runs give thrusts, not raw data, so there are no channels whose noise, clipping and losses "
-        "could be "
-        "looked at.");
+        "The runs give thrusts, not raw data, so there are no channels whose drift, clipping and losses "
+        "could be looked at.");
   }
   return Json::object();
 }

@@ -92,7 +92,7 @@ function budgetSection() {
       'The height of a bar is the combined standard uncertainty u; squares of parts add up, so each',
       'part is drawn as large as its share of the variance. U95 is u times Student’s t, about 2.',
       'Calibration, propellers and instruments are shared by all locations and cancel for the most',
-      'part in ΔC_T.');
+      'part in ΔC_T. Coming back: what changes when the rig is set up at a location anew.');
   const leftOutOfIt =
       [h('p', {}, 'What the budget leaves out:'), h('ul', {}, notes.map((note) => h('li', {}, note)))];
   return [

@@ -50,7 +50,7 @@ function residualFigure(cells) {
   const caption = sentences(
       'How much more force the fitted line gives than was applied, point by point; band: twice the',
       'standard deviation of the residuals. A bow, a trend or a fan says that a straight line with',
-      'one noise is not the whole truth. Diamonds stick out; crosses were left out as gross errors.');
+      'one noise is not the whole truth. Open diamonds: points that stick out; crosses: gross errors, left out.');
   return figure(
       'Residuals of the calibration', [], h('div', {class: 'panels'}, panels), caption, command('calibrate'));
 }

@@ -6,9 +6,13 @@ const instant = (seconds) => new Date(1000 * seconds).toISOString();
 const perCent = (part, whole) => (whole > 0 ? (100 * part) / whole : null);
 const difference = (a, b) => (known(a) && known(b) ? a - b : null);
 
+/** Makes room downwards only: dates at the ends, which come and go with the width, would do so without end. */
+const timeAxis = (title, more = {}) => axis(title, {type: 'date', automargin: 'height', ...more});
+const kTimeMargin = {l: 10, r: 28, t: 30, b: 10};
+
 /** What is looked at of every run, one above the other on one axis of time. */
 const checks = [
-  {title: 'drift / its error', unit: ' standard errors', value: (r, i) => r.drift_z[i]},
+  {title: 'drift / its<br>error [–]', unit: ' standard errors', value: (r, i) => r.drift_z[i]},
   {title: 'clipped [%]', unit: ' % of samples clipped', value: (r, i) => perCent(r.clipped[i], r.samples[i])},
   {title: 'lost [%]', unit: ' % of frames lost', value: (r, i) => perCent(r.lost[i], r.frames[i])},
   {
@@ -34,6 +38,7 @@ function checkTrace({unit, value}, chosen, kind) {
     y: shown.map((i) => value(report.runs, i)),
     text: shown.map(runLabel),
     legendgroup: kind.name,
+    cliponaxis: false,
     hovertemplate: `%{text}<br>%{x}<br>%{y:.3~g}${unit}<extra></extra>`,
   };
 }
@@ -46,7 +51,7 @@ function drawHealth() {
   const runLook = {name: 'thrust runs', marker: {color: runColour, size: 5}};
   const tareLook = {name: 'tares', marker: {color: tareColour, size: 6, symbol: 'triangle-up-open'}};
   const data = [];
-  const layout = {xaxis: axis('start of the run (UTC)', {type: 'date', anchor: `y${checks.length}`})};
+  const layout = {xaxis: timeAxis('start of the run (UTC)', {anchor: `y${checks.length}`})};
   checks.forEach((check, k) => {
     const id = k === 0 ? '' : k + 1;  // Plotly's axes are yaxis, yaxis2, …
     const at = {yaxis: `y${id}`, showlegend: k === 0};
@@ -57,6 +62,7 @@ function drawHealth() {
   });
   layout.shapes = [-kDriftLimit, kDriftLimit].map((limit) => rule(limit, style('--bad'), {yref: 'y'}));
   layout.legend = {orientation: 'h', y: 1.01, yanchor: 'bottom'};
+  layout.margin = kTimeMargin;
   return {data, layout};
 }
 
@@ -107,9 +113,10 @@ function drawTares({readings, gain_V_per_N: gain}) {
   return {
     data,
     layout: {
-      xaxis: axis('start of the tare (UTC)', {type: 'date'}),
+      xaxis: timeAxis('start of the tare (UTC)'),
       yaxis: axis(`zero − its mean [${gain ? 'mN' : 'mV'}]`),
       legend: {orientation: 'h', y: 1.01, yanchor: 'bottom'},
+      margin: kTimeMargin,
     },
   };
 }

@@ -1,7 +1,7 @@
 // C_T and U by location: the thesis's figure 4.17, a curve for each column of the tunnel.
 
 const quantities = {
-  c_t: {plain: 'C<sub>T</sub>', unit: '', axis: 'C<sub>T</sub>', format: '.4f'},
+  c_t: {plain: 'C<sub>T</sub>', unit: '', axis: 'C<sub>T</sub> [–]', format: '.4f'},
   u_percent: {plain: 'U', unit: ' %', axis: 'U [%]', format: '~g'},
 };
 
@@ -104,13 +104,13 @@ function drawLabels(locations, quantity, withSingles) {
 function locationFigure(title, quantity, tells) {
   const {locations} = report.sections.locations;
   const columns = columnsOf(locations);
-  let withSingles = true;
+  let withSingles = !isNarrow(innerWidth);
   const place = plot(
       `${title}; its numbers are in the table of locations`, (width) => (isNarrow(width) ? 460 : 520),
       () =>
           (columns.length ? drawColumns(columns, quantity, withSingles) :
                             drawLabels(locations, quantity, withSingles)));
-  const box = tick('single runs', true, (on) => {
+  const box = tick('single runs', withSingles, (on) => {
     withSingles = on;
     redraw(place);
   });
@@ -121,7 +121,7 @@ function locationFigure(title, quantity, tells) {
       'No location has a place in a tunnel (y_norm and z_norm are empty), so they stand side by side.';
   const caption = sentences(
       shown, tells,
-      'Faint points: single runs. Error bars: U95 of the mean, from the repeats, the sessions and what',
+      'Faint points, if wanted: single runs. Error bars: U95 of the mean, from the repeats, the sessions and what',
       'locations share; all points share their calibration, so they move together.');
   return figure(title, box, place, caption, command('reduce', '--csv coefficients.csv'));
 }

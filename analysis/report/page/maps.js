@@ -13,7 +13,8 @@ const fields = {
     of: 'U',
     tells:
         'The right pair minus the left pair, over all four. Blue (negative): the right pair lifts less and the ' +
-        'vehicle rolls to the right; red: to the left. On the middle plane it is 0 by symmetry.',
+        'vehicle rolls to the right; red: to the left. On the middle plane the map is 0 by symmetry: an ' +
+        'offset measured there is taken for an error that all locations share, and is not in the map.',
   },
 };
 
@@ -84,7 +85,7 @@ function colourBar({lowest, greatest, step, isValue, title}, narrow) {
       Array.from({length: Math.round((greatest - lowest) / step) + 1}, (_, i) => greatest - i * step);
   const below = {orientation: 'h', y: -0.16, yanchor: 'top', x: 0.5};
   return {
-    title: {text: title, side: narrow ? 'bottom' : 'right'},
+    title: {text: title, side: narrow ? 'bottom' : 'top'},
     tickvals: ticks,
     ticktext: ticks.map((tick) => fixed(tick, decimalsOf(step), isValue)),
     outlinewidth: 0,
@@ -156,9 +157,10 @@ function drawMap(maps, field, layerName, width) {
       ...crosses(maps, field),
     ],
     layout: {
-      xaxis: axis('← wall  ȳ = 2y/(w<sub>t</sub> − w<sub>q</sub>)  wall →', side),
+      xaxis: axis('← wall  ȳ = 2y/(w<sub>t</sub> − w<sub>q</sub>) [–]  wall →', side),
       yaxis: axis(heightTitle, {...side, scaleanchor: 'x'}),
-      margin: {l: 10, r: narrow ? 10 : 90, t: 30, b: narrow ? 90 : 10},
+      // Fixed: square axes, their titles and the bar's would push each other about without end.
+      margin: {...(narrow ? {l: 58, r: 14, t: 20, b: 112} : {l: 76, r: 118, t: 30, b: 60}), autoexpand: false},
     },
   };
 }

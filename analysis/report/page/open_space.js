@@ -31,7 +31,8 @@ function openSpace(location) {
       x: [null],
       y: [null],
       name: `OS, open space (${withU95(mean, u95)})`,
-      line: {color: grey, width: 6}
+      line: {color: grey, width: 8},
+      opacity: 0.45
     }
   };
 }
@@ -53,7 +54,7 @@ function drawAgainst(section, column, y) {
   }
   const xaxis =
       column ? heightAxis({range: [-1.15, 1.15]}) : axis('distance of the rotors from the plane [R]');
-  const yaxis = axis('C<sub>T</sub>', {tickformat: '.4f', range: y});
+  const yaxis = axis('C<sub>T</sub> [–]', {tickformat: '.4f', range: y});
   return {
     data,
     layout: {xaxis, yaxis, shapes, showlegend: true, legend: {orientation: 'h', y: -0.2, yanchor: 'top'}}
@@ -89,13 +90,13 @@ function againstFigure(section, column, y) {
       `${title}; its numbers are in the table of locations`, (width) => (isNarrow(width) ? 520 : 480),
       () => drawAgainst(section, column, y));
   const missing = [
-    !section.open_space && 'open space (OS)',
-    !hasPlane(section, 'ground') && 'a ground plane (GND)',
-    !hasPlane(section, 'ceiling') && 'a ceiling plane (CEIL)',
+    !section.open_space && 'in open space (OS)',
+    !hasPlane(section, 'ground') && 'above a ground plane (GND)',
+    !hasPlane(section, 'ceiling') && 'beneath a ceiling plane (CEIL)',
   ].filter(Boolean);
   const caption = sentences(
       section.open_space && 'Grey band: C_T in open space with its U95.', placement(section, column),
-      'Error bars: U95.', missing.length && `The campaign has no runs at ${missing.join(' and ')}.`);
+      'Error bars: U95.', missing.length && `The campaign has no runs ${missing.join(' or ')}.`);
   return figure(title, [], place, caption, command('reduce', '--csv coefficients.csv'));
 }
 

@@ -80,7 +80,7 @@ const documentTable = (documents) => table(
       {name: 'kind', cell: (d) => d.kind, text: true},
       {name: 'made (UTC)', cell: (d) => d.created_utc, text: true},
       {name: 'program', cell: (d) => d.program, text: true},
-      {name: 'command', cell: (d) => code(d.arguments), text: true},
+      {name: 'command', cell: (d) => h('span', {class: 'wrap'}, code(d.arguments)), text: true},
       {name: 'from', cell: (d) => h('span', {class: 'wrap'}, inputsText(d.inputs)), text: true},
     ],
     documents);

@@ -28,12 +28,14 @@ function backdrop(groups) {
   };
 }
 
-/** From 0 to what all but one in a hundred rows say, so that a few wild ones do not flatten the rest. */
+/** From 0 to beyond what all but one in a hundred rows say, so that a few wild ones do not flatten the rest. */
 function usualRange(groups) {
   const values = groups.flatMap((g) => g.c_t).sort((a, b) => a - b);
   const quantile = (share) => values[Math.round(share * (values.length - 1))];
   return [Math.min(0, 1.1 * quantile(0.01)), 1.1 * quantile(0.99)];
 }
+
+const outside = (groups, [low, high]) => groups.flatMap((g) => g.c_t).filter((c_t) => c_t < low || c_t > high);
 
 /** What is not in the curves, and what in them is not to be believed. */
 function reservations({unknown, at_rest: atRest, doubtful_lines: doubtful}) {
@@ -51,8 +53,8 @@ function drawSweeps(section, chosen) {
   return {
     data: section.groups.length > shown.length ? [backdrop(section.groups), ...data] : data,
     layout: {
-      xaxis: axis('speed [rev/min]'),
-      yaxis: axis(`C<sub>T</sub> (${section.convention} convention)`, {range: usualRange(section.groups)}),
+      xaxis: axis('speed [rev/min]', {tickformat: ',d'}),
+      yaxis: axis(`C<sub>T</sub> (${section.convention} convention) [–]`, {range: usualRange(section.groups)}),
       showlegend: true,
       legend: {orientation: 'h', y: -0.2, yanchor: 'top'}
     }
@@ -87,10 +89,12 @@ function sweepFigure(section) {
     chosen = now;
     redraw(place);
   });
+  const beyond = outside(groups, usualRange(groups)).length;
   const caption = sentences(
       `C_T of one rotor, from the column ${response}${response.includes(unit) ? '' : ` [${unit}]`},`,
-      `in the ${convention} convention. Faint lines: all groups; one row in a hundred lies outside`,
-      'the picture (double-click to see all). A table carries no repeats of its own, so there are no',
+      `in the ${convention} convention. Faint lines: all groups.`,
+      beyond && `Outside the picture: ${counted(beyond, 'row')} (double-click to see all).`,
+      'A table carries no repeats of its own, so there are no',
       'error bars: the scatter along a curve is what is known.', reservations(section));
   const content = groups.length > 1 ? h('div', {class: 'with-picker'}, picker, place) : place;
   return figure(

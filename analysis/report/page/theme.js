@@ -35,7 +35,7 @@ const diverging =
 const sequential =
     scale('#f9f9f9', '#eae6f1', '#dad2ea', '#cabfe2', '#bbacda', '#ab9ad2', '#9b88ca', '#8a76c1', '#7a64b9');
 
-/** An axis with its title and what else is said of it. */
+/** An axis with its title, which ends with the unit ([–]: none), and what else is said of it. */
 const axis = (title, more = {}) => ({
   title: {text: title, standoff: 8},
   gridcolor: style('--line'),
@@ -48,7 +48,7 @@ const axis = (title, more = {}) => ({
   ...more,
 });
 
-const heightTitle = '← ground  z̄ = 2z/(h<sub>t</sub> − h<sub>q</sub>)  ceiling →';
+const heightTitle = '← ground  z̄ = 2z/(h<sub>t</sub> − h<sub>q</sub>) [–]  ceiling →';
 
 const isNarrow = (width) => width < 560;
 

@@ -57,7 +57,7 @@ function record(complaints, requests) {
   return ({method, params}) => {
     if (method === 'Runtime.exceptionThrown')
       complaints.push(params.exceptionDetails.exception?.description ?? params.exceptionDetails.text);
-    if (method === 'Runtime.consoleAPICalled' && ['error', 'warning', 'assert'].includes(params.type))
+    if (method === 'Runtime.consoleAPICalled' && ['error', 'warning', 'assert', 'trace'].includes(params.type))
       complaints.push(`console: ${params.args.map((a) => a.value ?? a.description).join(' ')}`);
     if (method === 'Log.entryAdded' && params.entry.level === 'error')
       complaints.push(`log: ${params.entry.text}`);
