@@ -40,6 +40,7 @@ void add_extreme_of_u(const Summary& summary, Json& json) {
   for (const LocationSummary& location : summary.locations) {
     if (greatest == nullptr || rank(*greatest) < rank(location)) greatest = &location;
   }
+  if (greatest == nullptr) return;
   json["greatest_uneven_percent"] =
       value_at(greatest->label, greatest->u_percent.mean, greatest->u_percent.u95);
 }

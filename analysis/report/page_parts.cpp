@@ -10,7 +10,7 @@
       "_end:\n"                                                                                             \
       ".popsection\n");                                                                                     \
   extern "C" const std::uint64_t name##_size;                                                               \
-  extern "C" const char name[];
+  extern "C" const char name[];  // NOLINT(bugprone-macro-parentheses): declares the name
 
 TUNNELRIG_EMBED(tunnelrig_page_template, TUNNELRIG_TEMPLATE_FILE)
 TUNNELRIG_EMBED(tunnelrig_page_style, TUNNELRIG_STYLE_FILE)
