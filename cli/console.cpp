@@ -26,7 +26,7 @@ bool is_numeric(const std::string& cell) {
 }
 
 std::string bar_of(double fraction) {
-  const auto filled = static_cast<std::size_t>(fraction * kBarWidth + 0.5);
+  const auto filled = static_cast<std::size_t>(std::lround(fraction * kBarWidth));
   std::string bar;
   for (std::size_t i = 0; i < kBarWidth; ++i) bar += i < filled ? "█" : "░";
   return bar;

@@ -1,4 +1,5 @@
-// tunnelrig explain: find the residual, trace it to the effect that the model lacks, add it, report before and after.
+// tunnelrig explain: find the residual, trace it to the effect that the model lacks, add it, report before
+// and after.
 #include "analysis/residual/explanation_output.h"
 #include "cli/console.h"
 #include "cli/verb.h"
@@ -35,7 +36,8 @@ int list(const Options& options) {
   std::optional<Observations> observations;
   if (!options.db.empty()) observations = observations_of_file(options);
   const Observations* given = observations ? &*observations : nullptr;
-  fmt::print("{}\n", options.json.empty() ? candidates_text(candidates(), given) : candidates_json(candidates(), given));
+  fmt::print("{}\n", options.json.empty() ? candidates_text(candidates(), given)
+                                          : candidates_json(candidates(), given));
   return kWell;
 }
 
@@ -72,14 +74,23 @@ void add_explain(CLI::App& app, Work& work) {
       "          tunnelrig explain --list --db my.db");
   verb->add_option("--db", options->db, "Campaign file");
   verb->add_option("--response", options->response, "thrust, c_t, cell, or a column")->option_text("NAME");
-  verb->add_option("--baseline", options->baseline, "thesis, open_space; tables: constant, linear:COLUMN, power:COLUMN");
-  verb->add_option("--max-effects", options->search.most_effects, "At most so many effects")->check(CLI::Range(0, 12))->capture_default_str();
-  verb->add_option("--alpha", options->search.alpha, "Chance of a name where there is no effect")->check(CLI::Range(0.001, 0.5))->capture_default_str();
-  verb->add_option("--simulations", options->search.simulations, "Data sets without effect to compare with")->check(CLI::Range(99, 99999))->capture_default_str();
+  verb->add_option("--baseline", options->baseline,
+                   "thesis, open_space; tables: constant, linear:COLUMN, power:COLUMN");
+  verb->add_option("--max-effects", options->search.most_effects, "At most so many effects")
+      ->check(CLI::Range(0, 12))
+      ->capture_default_str();
+  verb->add_option("--alpha", options->search.alpha, "Chance of a name where there is no effect")
+      ->check(CLI::Range(0.001, 0.5))
+      ->capture_default_str();
+  verb->add_option("--simulations", options->search.simulations, "Data sets without effect to compare with")
+      ->check(CLI::Range(99, 99999))
+      ->capture_default_str();
   verb->add_option("--seed", options->search.seed, "Of seal and simulations")->capture_default_str();
-  verb->add_option("--json", options->json, "Write the explanation as JSON to this file (- for standard output)");
+  verb->add_option("--json", options->json,
+                   "Write the explanation as JSON to this file (- for standard output)");
   verb->add_option("--html", options->html, "Write a page with the pictures");
-  verb->add_flag("--list", options->list, "Print the candidates, and with --db whether this data can test them");
+  verb->add_flag("--list", options->list,
+                 "Print the candidates, and with --db whether this data can test them");
   verb->add_flag("--adopt", options->adopt, "Store the accepted effects as the next version of the model");
   verb->callback([options, &work] { work = [options] { return run(*options); }; });
 }

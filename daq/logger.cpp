@@ -170,7 +170,7 @@ class Recording {
         if (capture.is_open())
           capture.write(reinterpret_cast<const char*>(block->bytes.data()),
                         static_cast<std::streamsize>(block->bytes.size()));
-        const std::string end = take(*block, reader);
+        std::string end = take(*block, reader);
         if (!end.empty()) return end;
       }
       commit_when_due();

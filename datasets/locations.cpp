@@ -32,7 +32,7 @@ std::optional<TunnelPoint> grid_point(std::string_view label) {
   const auto column = small_integer(label.substr(1, v - 1));
   const auto row = small_integer(label.substr(v + 1));
   if (!column || !row || *column < 0 || *column > 5 || *row < -3 || *row > 3) return {};
-  return TunnelPoint{kColumns[static_cast<std::size_t>(*column)], kRows[static_cast<std::size_t>(*row + 3)]};
+  return TunnelPoint{kColumns[static_cast<std::size_t>(*column)], kRows[static_cast<unsigned>(*row + 3)]};
 }
 
 std::string canonical_location(std::string_view label) {

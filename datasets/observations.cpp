@@ -41,7 +41,7 @@ class Reader {
   std::optional<std::string> string(std::string_view key) const {
     const toml::node* node = table_.get(key);
     if (node == nullptr) return {};
-    if (const auto value = node->value<std::string>()) return value;
+    if (auto value = node->value<std::string>()) return value;
     throw InputError::at(file_, line(*node), "{}{} must be text in quotes", name_, key);
   }
 

@@ -174,7 +174,7 @@ void RawWriter::commit(const std::optional<Ledger>& ledger) {
 }
 
 std::string RawWriter::finish(RunState state, const std::optional<Ledger>& ledger) {
-  const std::string hash = hasher_.finish(all_gaps_);
+  std::string hash = hasher_.finish(all_gaps_);
   JoinedTransaction transaction(file_.database());
   write_pending(ledger);
   write_state(file_.database(), id_, state, frames_, hash);

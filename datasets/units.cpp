@@ -79,6 +79,7 @@ const Unit& unit_from_name(std::string_view name) {
       std::find_if(kUnits.begin(), kUnits.end(), [&](const Unit& unit) { return unit.name == name; });
   if (found != kUnits.end()) return *found;
   std::vector<std::string_view> names;
+  names.reserve(kUnits.size());
   for (const Unit& unit : kUnits) names.push_back(unit.name);
   throw InputError(fmt::format("'{}' is not a known unit; known are {}", name, fmt::join(names, " ")));
 }

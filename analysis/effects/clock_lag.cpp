@@ -20,7 +20,7 @@ std::vector<Effect> clock_lag() {
       .form = "",
       .formula = "F (1 − l (dΘ/dt) / Θ)",
       .physics = "a lag l of the thermometer's clock shifts the density along its trend",
-      .parameters = {{"lag", "s", -7200, 7200}},
+      .parameters = {{"lag", "s", -900, 900}},
       .covariates = {"air_temperature_rate_K_s", "air_temperature_C"},
       .scope = EffectScope::kShared,
       .sign_rule = "either",

@@ -10,8 +10,9 @@ bool Effect::within_time() const {
 }
 
 bool Effect::has_change_point() const {
-  return std::any_of(parameters.begin(), parameters.end(),
-                     [](const EffectParameter& parameter) { return parameter.role == ParameterRole::kChangePoint; });
+  return std::any_of(parameters.begin(), parameters.end(), [](const EffectParameter& parameter) {
+    return parameter.role == ParameterRole::kChangePoint;
+  });
 }
 
 std::vector<double> time_constants_s() {

@@ -19,7 +19,7 @@ std::vector<Effect> nonlinearity() {
       .form = "",
       .formula = "F (1 + q F)",
       .physics = "second-order term of the cell's characteristic (OIML R 60, linearity)",
-      .parameters = {{"coefficient", "1/N", -0.1, 0.1}},
+      .parameters = {{"coefficient", "1/N", -0.01, 0.01}},
       .covariates = {},
       .scope = EffectScope::kRotor,
       .sign_rule = "either",

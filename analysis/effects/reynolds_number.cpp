@@ -8,11 +8,12 @@
 namespace tunnelrig::effects {
 namespace {
 
-/// At 101325 Pa; viscosity by Sutherland.
+/// Viscosity by Sutherland; the density at 101325 Pa where the pressure was not measured.
 double reynolds(std::span<const double> x, const Rig& rig) {
   const double kelvin = x[1] + kZeroCelsius_K;
+  const double pressure_Pa = x.size() > 2 ? x[2] : 101325.0;
   const double tip_m_s = x[0] * 2 * std::numbers::pi / 60 * rig.propeller_radius_m;
-  return dry_air_density_kg_m3(101325.0, kelvin) * tip_m_s * rig.blade_chord_m / air_viscosity_Pa_s(kelvin);
+  return dry_air_density_kg_m3(pressure_Pa, kelvin) * tip_m_s * rig.blade_chord_m / air_viscosity_Pa_s(kelvin);
 }
 
 struct ReynoldsNumber {
@@ -27,18 +28,22 @@ struct ReynoldsNumber {
 }  // namespace
 
 std::vector<Effect> reynolds_number() {
-  return {make_effect<ReynoldsNumber>({
-      .name = "reynolds_number",
-      .form = "",
-      .formula = "F (Re / Re0)^m, Re = ρ Ω R c / μ(Θ)",
-      .physics = "lift of thin blades grows with Re below 1e5 (Deters, Ananda & Selig, AIAA 2014-2151)",
-      .parameters = {{"exponent", "1", -0.5, 0.8}},
-      .covariates = {"speed_rpm", "air_temperature_C"},
-      .scope = EffectScope::kShared,
-      .sign_rule = "both: some blades lose, most gain",
-      .force_N = {},
-      .jet_N = {},
-  })};
+  const auto form = [](const char* name, std::vector<std::string> covariates) {
+    return make_effect<ReynoldsNumber>({
+        .name = "reynolds_number",
+        .form = name,
+        .formula = "F (Re / Re0)^m, Re = ρ Ω R c / μ(Θ)",
+        .physics = "lift of thin blades grows with Re below 1e5 (Deters, Ananda & Selig, AIAA 2014-2151)",
+        .parameters = {{"exponent", "1", -0.5, 0.8}},
+        .covariates = std::move(covariates),
+        .scope = EffectScope::kShared,
+        .sign_rule = "both: some blades lose, most gain",
+        .force_N = {},
+        .jet_N = {},
+    });
+  };
+  return {form("", {"speed_rpm", "air_temperature_C"}),
+          form("measured pressure", {"speed_rpm", "air_temperature_C", "air_pressure_Pa"})};
 }
 
 }  // namespace tunnelrig::effects

@@ -19,7 +19,7 @@ std::vector<Effect> temperature_gradient() {
       .form = "",
       .formula = "F + g z (θ_cell − θ_air)",
       .physics = "thermal gradient across the bridge unbalances it",
-      .parameters = {{"coefficient", "V/K", -1, 1}},
+      .parameters = {{"coefficient", "V/K", -0.05, 0.05}},
       .covariates = {"cell_temperature_C", "air_temperature_C"},
       .scope = EffectScope::kRotor,
       .additive = true,

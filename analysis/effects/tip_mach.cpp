@@ -33,7 +33,7 @@ std::vector<Effect> tip_mach() {
       .formula = "F ((1 − M²) / (1 − M0²))^(−m), M = Ω R / a(Θ)",
       .physics = "Prandtl–Glauert: the lift slope goes with (1 − M²)^(−1/2); m is the share of the blade "
                  "that sees it",
-      .parameters = {{"exponent", "1", 0, 6}},
+      .parameters = {{"exponent", "1", 0, 2}},
       .covariates = {"speed_rpm", "air_temperature_C"},
       .scope = EffectScope::kShared,
       .sign_rule = "thrust grows with the tip Mach number",

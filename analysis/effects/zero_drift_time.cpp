@@ -19,7 +19,7 @@ std::vector<Effect> zero_drift_time() {
       .form = "",
       .formula = "F + g z h, h since the first run of the session",
       .physics = "slow drift of the zero of bridge and amplifier",
-      .parameters = {{"rate", "V/h", -1, 1}},
+      .parameters = {{"rate", "V/h", -0.2, 0.2}},
       .covariates = {"hours_in_session"},
       .scope = EffectScope::kRotor,
       .additive = true,

@@ -24,17 +24,20 @@ double prior_weight(const Term& term, std::size_t ways) {
   return weight;
 }
 
-/// Early enough that a campaign without effect costs little, and never before the p that was asked for is settled.
+/// Early enough that a campaign without effect costs little, and never before the p that was asked for is
+/// settled.
 class NullMaxima {
  public:
-  NullMaxima(const CandidateScan& scan, const NullFit& null, const SearchSettings& settings, std::uint64_t salt)
+  NullMaxima(const CandidateScan& scan, const NullFit& null, const SearchSettings& settings,
+             std::uint64_t salt)
       : scan_(scan), null_(null), settings_(settings), random_(settings.seed * 1000003 + salt) {}
 
   double p(double evidence) {
     constexpr std::size_t kBatch = 111, kEnough = 30;
     std::size_t above = count(evidence);
     while (maxima_.size() < settings_.simulations && above < kEnough) {
-      const auto batch = scan_.simulated_maxima(null_, std::min(kBatch, settings_.simulations - maxima_.size()), random_);
+      const auto batch =
+          scan_.simulated_maxima(null_, std::min(kBatch, settings_.simulations - maxima_.size()), random_);
       maxima_.insert(maxima_.end(), batch.begin(), batch.end());
       above = count(evidence);
     }
@@ -46,14 +49,17 @@ class NullMaxima {
     p(1e9);  // all of them
     std::vector<double> sorted = maxima_;
     std::sort(sorted.begin(), sorted.end());
-    const auto rank = static_cast<std::size_t>(std::ceil((1 - settings_.alpha) * static_cast<double>(sorted.size() + 1))) - 1;
+    const auto rank =
+        static_cast<std::size_t>(std::ceil((1 - settings_.alpha) * static_cast<double>(sorted.size() + 1))) -
+        1;
     return sorted[std::min(rank, sorted.size() - 1)];
   }
   const std::vector<double>& values() const { return maxima_; }
 
  private:
   std::size_t count(double evidence) const {
-    return static_cast<std::size_t>(std::count_if(maxima_.begin(), maxima_.end(), [&](double m) { return m >= evidence; }));
+    return static_cast<std::size_t>(
+        std::count_if(maxima_.begin(), maxima_.end(), [&](double m) { return m >= evidence; }));
   }
 
   const CandidateScan& scan_;
@@ -65,11 +71,16 @@ class NullMaxima {
 
 class Search {
  public:
-  Search(const Observations& observations, const std::vector<int>& rows, const std::vector<const Effect*>& effects, const SearchSettings& settings)
-      : observations_(observations), rows_(rows), settings_(settings), mixed_(observations, rows),
-        ways_(all_ways(effects, observations, rows)), curves_(curves_to_try(observations, rows)), y_(response_components(observations)) {
-    for (const Term& way : ways_)
-      ++points_[way.effect->name + std::to_string(way.rotor)];
+  Search(const Observations& observations, const std::vector<int>& rows,
+         const std::vector<const Effect*>& effects, const SearchSettings& settings)
+      : observations_(observations),
+        rows_(rows),
+        settings_(settings),
+        mixed_(observations, rows),
+        ways_(all_ways(effects, observations, rows)),
+        curves_(curves_to_try(observations, rows)),
+        y_(response_components(observations)) {
+    for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
   }
 
   Attribution run() {
@@ -84,15 +95,18 @@ class Search {
   }
 
  private:
-  // --- named effects --------------------------------------------------------------------------------------------------
+  // --- named effects
+  // --------------------------------------------------------------------------------------------------
 
   void add_effects() {
-    while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect()) swap_weaker();
+    while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect())
+      swap_weaker();
   }
 
   bool already_in(const Term& way) const {
     return std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& accepted) {
-      return accepted.term.effect->name == way.effect->name && (accepted.term.rotor == way.rotor || accepted.term.rotor < 0 || way.rotor < 0) &&
+      return accepted.term.effect->name == way.effect->name &&
+             (accepted.term.rotor == way.rotor || accepted.term.rotor < 0 || way.rotor < 0) &&
              accepted.term.other == way.other && !way.effect->has_change_point();
     });
   }
@@ -124,7 +138,9 @@ class Search {
     const EffectParameter& amplitude = way.effect->parameters[0];
     const std::size_t points = points_.at(way.effect->name + std::to_string(way.rotor));
     return {.columns = {respond(way, observations_, predicted).derivative[0]},
-            .sign = amplitude.lower >= 0 ? 1 : amplitude.upper <= 0 ? -1 : 0,
+            .sign = amplitude.lower >= 0   ? 1
+                    : amplitude.upper <= 0 ? -1
+                                           : 0,
             .weight = prior_weight(way, points)};
   }
 
@@ -162,7 +178,8 @@ class Search {
     round.null_maxima = maxima.values();
     if (result_.rounds.empty()) set_detectable(scan);
     const bool added = p <= settings_.alpha && accept_first_sound(scan, maxima, round);
-    if (!added && round.outcome.empty()) round.outcome = fmt::format("nothing: p = {:.3g} for {}", p, scan.ways[scan.order[0]].label());
+    if (!added && round.outcome.empty())
+      round.outcome = fmt::format("nothing: p = {:.3g} for {}", p, scan.ways[scan.order[0]].label());
     result_.rounds.push_back(std::move(round));
     return added;
   }
@@ -170,11 +187,14 @@ class Search {
   std::vector<Ranked> ranking(const Scan& scan, NullMaxima& maxima) const {
     std::vector<Ranked> result;
     for (const std::size_t i : scan.order) {
-      const bool seen = std::any_of(result.begin(), result.end(), [&](const Ranked& r) { return r.term.effect->name == scan.ways[i].effect->name; });
+      const bool seen = std::any_of(result.begin(), result.end(), [&](const Ranked& r) {
+        return r.term.effect->name == scan.ways[i].effect->name;
+      });
       if (seen) continue;
       const double evidence = scan.fits[i].evidence, ratio = scan.fits[i].likelihood_ratio;
       const double amplitude = scan.fits[i].amplitude.size() > 0 ? scan.fits[i].amplitude(0) : 0;
-      result.push_back({scan.ways[i], evidence, maxima.p(evidence), amplitude, ratio > 0 ? std::abs(amplitude) / std::sqrt(2 * ratio) : 0});
+      result.push_back({scan.ways[i], evidence, maxima.p(evidence), amplitude,
+                        ratio > 0 ? std::abs(amplitude) / std::sqrt(2 * ratio) : 0});
     }
     return result;
   }
@@ -182,27 +202,36 @@ class Search {
   /// The best candidate whose parameters stay within physics and which predicts blocks that it has not seen.
   bool accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round) {
     std::vector<const Effect*> refused;
-    const CrossValidation before = cross_validate(observations_, difference(y_, fit_.linear.offset), fit_.linear.columns, fit_.variances, rows_);
+    const CrossValidation before = cross_validate(observations_, difference(y_, fit_.linear.offset),
+                                                  fit_.linear.columns, fit_.variances, rows_);
     for (const std::size_t i : scan.order) {
       if (scan.fits[i].evidence < critical_) break;
       if (std::find(refused.begin(), refused.end(), scan.ways[i].effect) != refused.end()) continue;
       refused.push_back(scan.ways[i].effect);
       JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
       const Term& term = fit.model.terms.back();
-      if (std::any_of(fit.at_bound.begin(), fit.at_bound.end(), [&](const std::string& b) { return b.starts_with(term.effect->name + " " + term.effect->parameters[0].name); })) {
+      if (std::any_of(fit.at_bound.begin(), fit.at_bound.end(), [&](const std::string& b) {
+            return b.starts_with(term.effect->name + " " + term.effect->parameters[0].name);
+          })) {
         round.outcome += fmt::format("{} would leave its physical bounds; ", term.label());
         continue;
       }
-      const CrossValidation after = cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns, fit.variances, rows_);
+      const CrossValidation after = cross_validate(observations_, difference(y_, fit.linear.offset),
+                                                   fit.linear.columns, fit.variances, rows_);
       // Both are scored by the variances of the larger model, so that the difference is the mean's.
-      const CrossValidation base = cross_validate(observations_, difference(y_, fit_.linear.offset), fit_.linear.columns, fit.variances, rows_);
+      const CrossValidation base = cross_validate(observations_, difference(y_, fit_.linear.offset),
+                                                  fit_.linear.columns, fit.variances, rows_);
       const LossDifference gain = compare(base, after);
       if (!(gain.mean > gain.standard_error)) {
         round.outcome += fmt::format("{} does not predict unseen blocks; ", term.label());
         continue;
       }
-      result_.accepted.push_back({.term = term, .p = maxima.p(scan.fits[i].evidence), .gain = before.rmse() - after.rmse(),
-                                  .loss_gain = gain.mean, .loss_standard_error = gain.standard_error, .confounded = {}});
+      result_.accepted.push_back({.term = term,
+                                  .p = maxima.p(scan.fits[i].evidence),
+                                  .gain = before.rmse() - after.rmse(),
+                                  .loss_gain = gain.mean,
+                                  .loss_standard_error = gain.standard_error,
+                                  .confounded = {}});
       fit_ = std::move(fit);
       read_back_terms();
       round.outcome += "accepted " + term_label(result_.accepted.back());
@@ -243,7 +272,8 @@ class Search {
       const Scan scan = scan_effects(without);
       const double own = evidence_of(scan, old.term);
       const std::size_t best = scan.order.empty() ? 0 : scan.order[0];
-      const bool swap = !scan.order.empty() && !scan.ways[best].same_way(old.term) && scan.fits[best].evidence > own + kSwapDecades;
+      const bool swap = !scan.order.empty() && !scan.ways[best].same_way(old.term) &&
+                        scan.fits[best].evidence > own + kSwapDecades;
       Accepted kept = old;
       if (swap) {
         const JointFit current = fit_;
@@ -278,7 +308,8 @@ class Search {
     return fit_jointly(observations_, model, rows_);
   }
 
-  // --- structure without a name ---------------------------------------------------------------------------------------
+  // --- structure without a name
+  // ---------------------------------------------------------------------------------------
 
   void add_curves() {
     while (static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve()) {
@@ -293,7 +324,8 @@ class Search {
     std::vector<std::size_t> tried;
     for (std::size_t c = 0; c < curves_.size(); ++c) {
       const bool in = std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
-        return found.curve.covariate == curves_[c].covariate && (found.curve.rotor < 0 || found.curve.rotor == curves_[c].rotor);
+        return found.curve.covariate == curves_[c].covariate &&
+               (found.curve.rotor < 0 || found.curve.rotor == curves_[c].rotor);
       });
       if (in) continue;
       scan.candidates.push_back(as_candidate(curves_[c]));
@@ -335,14 +367,16 @@ class Search {
       if (!mixed_.strata()[s].means()) continue;
       double below = 0;
       for (std::size_t r = 0; r < fit_.variances.ratio_probability[s].size(); ++r) {
-        if (kRatios[r] <= settings_.session_ratio * settings_.session_ratio) below += fit_.variances.ratio_probability[s][r];
+        if (kRatios[r] <= settings_.session_ratio * settings_.session_ratio)
+          below += fit_.variances.ratio_probability[s][r];
       }
       if (below < 0.025) return true;
     }
     return false;
   }
 
-  // --- what cannot be told apart --------------------------------------------------------------------------------------
+  // --- what cannot be told apart
+  // --------------------------------------------------------------------------------------
 
   void find_confounded() {
     const std::vector<Accepted> all = result_.accepted;
@@ -369,7 +403,8 @@ class Search {
     };
     std::optional<CrossValidation> own;
     for (const std::size_t i : scan.order)
-      if (!own && scan.ways[i].effect->name == accepted.term.effect->name && scan.ways[i].rotor == accepted.term.rotor)
+      if (!own && scan.ways[i].effect->name == accepted.term.effect->name &&
+          scan.ways[i].rotor == accepted.term.rotor)
         own = validate(scan.candidates[i]);
     if (!own) return result;
     std::vector<std::string> done = {accepted.term.effect->name};
@@ -379,7 +414,8 @@ class Search {
       if (std::count(done.begin(), done.end(), name) >= 3) continue;  // three ways of each are tried
       done.push_back(name);
       if (name == accepted.term.effect->name) continue;
-      const bool listed = std::any_of(result.begin(), result.end(), [&](const Ranked& r) { return r.term.effect->name == name; });
+      const bool listed = std::any_of(result.begin(), result.end(),
+                                      [&](const Ranked& r) { return r.term.effect->name == name; });
       if (listed) continue;
       const LossDifference difference = compare(validate(scan.candidates[i]), *own);
       if (difference.mean >= 2 * difference.standard_error) continue;
@@ -413,7 +449,8 @@ class Search {
     Index count = 0;
     for (std::size_t s = 0; s < mixed_.strata().size(); ++s) {
       if (!mixed_.strata()[s].means()) continue;
-      Components components(1 + observations_.shape.size(), Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
+      Components components(1 + observations_.shape.size(),
+                            Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
       components[0] = column;
       stacked = mixed_.stack(s, {&components});
       mixed_.project(s, 0, stacked);
@@ -440,7 +477,8 @@ class Search {
 
 }  // namespace
 
-std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations, const std::vector<int>& rows) {
+std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,
+                           const std::vector<int>& rows) {
   std::vector<Term> ways;
   for (const Effect* effect : effects) {
     if (!testability(*effect, observations).ok()) continue;
@@ -449,8 +487,8 @@ std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Obse
   return ways;
 }
 
-Attribution attribute(const Observations& observations, const std::vector<int>& rows, const std::vector<const Effect*>& effects,
-                      const SearchSettings& settings) {
+Attribution attribute(const Observations& observations, const std::vector<int>& rows,
+                      const std::vector<const Effect*>& effects, const SearchSettings& settings) {
   return Search(observations, rows, effects, settings).run();
 }
 

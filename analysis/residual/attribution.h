@@ -1,4 +1,5 @@
-// From residuals to named effects: the search, on the runs that are not sealed. docs/closed-loop.md has the protocol.
+// From residuals to named effects: the search, on the runs that are not sealed. docs/closed-loop.md has the
+// protocol.
 #pragma once
 
 #include "analysis/residual/joint_fit.h"
@@ -39,7 +40,7 @@ struct Round {
 struct Accepted {
   Term term;
   double p = 1;
-  double gain = 0;       // fall of the leave-one-block-out error, response's unit
+  double gain = 0;  // fall of the leave-one-block-out error, response's unit
   double loss_gain = 0, loss_standard_error = 0;
   std::vector<Ranked> confounded;  // one way of each effect that does as well
 };
@@ -59,9 +60,10 @@ struct Attribution {
 };
 
 /// Candidates that can be tried, each in all its ways.
-std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations, const std::vector<int>& rows);
+std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,
+                           const std::vector<int>& rows);
 
-Attribution attribute(const Observations& observations, const std::vector<int>& rows, const std::vector<const Effect*>& effects,
-                      const SearchSettings& settings);
+Attribution attribute(const Observations& observations, const std::vector<int>& rows,
+                      const std::vector<const Effect*>& effects, const SearchSettings& settings);
 
 }  // namespace tunnelrig

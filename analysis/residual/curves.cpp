@@ -1,6 +1,7 @@
 #include "analysis/residual/curves.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <set>
@@ -13,14 +14,17 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr int kMostBends = 6;
+/// Few bends see a weak trend, many a wave: each covariate is tried with all of these.
+constexpr std::array<int, 3> kBends = {2, 4, 6};
 
 Components nothing(const Observations& observations) {
-  return Components(1 + observations.shape.size(), MatrixXd::Zero(observations.rows(), observations.channels()));
+  return Components(1 + observations.shape.size(),
+                    MatrixXd::Zero(observations.rows(), observations.channels()));
 }
 
 /// cos(π k u), u = 0 … 1 over the covariate's range: bends of ever shorter length.
-std::vector<Components> bends(const Observations& observations, const Covariate& covariate, int rotor, int count) {
+std::vector<Components> bends(const Observations& observations, const Covariate& covariate, int rotor,
+                              int count) {
   const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff();
   std::vector<Components> columns;
   for (int k = 1; k <= count; ++k) {
@@ -28,7 +32,8 @@ std::vector<Components> bends(const Observations& observations, const Covariate&
     for (Index row = 0; row < observations.rows(); ++row)
       for (Index channel = 0; channel < observations.channels(); ++channel)
         if (rotor < 0 || channel == rotor)
-          columns.back()[0](row, channel) = std::cos(std::numbers::pi * k * (covariate.at(row, channel) - low) / (high - low));
+          columns.back()[0](row, channel) =
+              std::cos(std::numbers::pi * k * (covariate.at(row, channel) - low) / (high - low));
   }
   return columns;
 }
@@ -49,7 +54,9 @@ int different_values(const Covariate& covariate, const std::vector<int>& rows) {
   return static_cast<int>(values.size());
 }
 
-std::string reported_name(const std::string& covariate) { return covariate == "hours_in_session" ? "start_utc" : covariate; }
+std::string reported_name(const std::string& covariate) {
+  return covariate == "hours_in_session" ? "start_utc" : covariate;
+}
 
 }  // namespace
 
@@ -59,15 +66,20 @@ std::string Curve::label() const {
 
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows) {
   std::vector<int> rotors = {-1};
-  for (int rotor = 0; rotor < static_cast<int>(observations.channels()) && observations.channels() > 1; ++rotor) rotors.push_back(rotor);
+  for (int rotor = 0; rotor < static_cast<int>(observations.channels()) && observations.channels() > 1;
+       ++rotor)
+    rotors.push_back(rotor);
   std::vector<Curve> curves;
   for (const Covariate& covariate : observations.covariates) {
     if (observations.not_usable.contains(covariate.name) || covariate.value.array().isNaN().any()) continue;
     if (!(covariate.value.maxCoeff() > covariate.value.minCoeff())) continue;
-    const int count = std::min(kMostBends, different_values(covariate, rows) / 3);
-    if (count < 1) continue;
-    for (const int rotor : rotors)
-      curves.push_back({reported_name(covariate.name), rotor, bends(observations, covariate, rotor, count), covariate.value});
+    const int most = different_values(covariate, rows) / 3;
+    for (const int count : kBends) {
+      if (count > most) continue;
+      for (const int rotor : rotors)
+        curves.push_back({reported_name(covariate.name), rotor, bends(observations, covariate, rotor, count),
+                          covariate.value});
+    }
   }
   if (!observations.shape.empty())
     for (const int rotor : rotors) curves.push_back({"time_in_run", rotor, course(observations, rotor), {}});

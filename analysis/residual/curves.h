@@ -1,4 +1,5 @@
-// Structure without a name: smooth dependence of the residual on a covariate, on the order of runs, on time within them.
+// Structure without a name: smooth dependence of the residual on a covariate, on the order of runs, on time
+// within them.
 #pragma once
 
 #include "analysis/residual/likelihood.h"
@@ -10,16 +11,17 @@ namespace tunnelrig {
 
 /// A curve over one covariate, of all rotors alike or of one. It describes; it never names a cause.
 struct Curve {
-  std::string covariate;  // a column of the sheet, or "run_order", "time_in_run", "start_utc" (hours in the session)
+  std::string
+      covariate;  // a column of the sheet, or "run_order", "time_in_run", "start_utc" (hours in the session)
   int rotor = -1;
   std::vector<Components> columns;
-  Eigen::MatrixXd x;      // n × 1 or n × c: what it is drawn against; empty for time_in_run
+  Eigen::MatrixXd x;  // n × 1 or n × c: what it is drawn against; empty for time_in_run
 
   std::string label() const;
 };
 
-/// Curves over everything that is known of the runs. `rows` decide how many bends a covariate can show: one for every
-/// three different values, at most six.
+/// Curves over everything that is known of the runs. `rows` decide how many bends a covariate can show: one
+/// for every three different values, at most six.
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows);
 
 Candidate as_candidate(const Curve& curve);

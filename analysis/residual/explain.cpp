@@ -37,14 +37,15 @@ double rms(const MatrixXd& errors) {
   return count == 0 ? 0 : std::sqrt(missing.select(0, errors).squaredNorm() / static_cast<double>(count));
 }
 
-HeldOutErrors score(const Observations& observations, const JointFit& fit, const NullFit& variances, const std::vector<int>& fit_rows,
-                    const std::vector<int>& test_rows) {
+HeldOutErrors score(const Observations& observations, const JointFit& fit, const NullFit& variances,
+                    const std::vector<int>& fit_rows, const std::vector<int>& test_rows) {
   const Components y = difference(response_components(observations), fit.linear.offset);
   return predict_held_out(observations, y, fit.linear.columns, variances, fit_rows, test_rows);
 }
 
 /// Interval of a root mean square whose blocks are resampled; Student's t for their number, on the logarithm.
-void set_interval(const Observations& observations, const HeldOutErrors& errors, std::uint64_t seed, ErrorEstimate& estimate) {
+void set_interval(const Observations& observations, const HeldOutErrors& errors, std::uint64_t seed,
+                  ErrorEstimate& estimate) {
   std::map<int, std::pair<double, double>> blocks;  // squares, count
   for (std::size_t r = 0; r < errors.rows.size(); ++r)
     for (Index c = 0; c < errors.error.cols(); ++c) {
@@ -54,7 +55,8 @@ void set_interval(const Observations& observations, const HeldOutErrors& errors,
       block.first += e * e;
       block.second += 1;
     }
-  estimate.held_out_rmse = errors.count() == 0 ? 0 : std::sqrt(errors.sum_of_squares() / static_cast<double>(errors.count()));
+  estimate.held_out_rmse =
+      errors.count() == 0 ? 0 : std::sqrt(errors.sum_of_squares() / static_cast<double>(errors.count()));
   estimate.held_out_low = estimate.held_out_high = estimate.held_out_rmse;
   if (blocks.size() < 2 || !(estimate.held_out_rmse > 0)) return;
   std::vector<std::pair<double, double>> list;
@@ -76,7 +78,8 @@ void set_interval(const Observations& observations, const HeldOutErrors& errors,
   }
   const double n = static_cast<double>(list.size());
   // The bootstrap's variance of a mean is short by (n − 1)/n.
-  const double variance = std::max(0.0, squares / kResamples - sum * sum / kResamples / kResamples) * n / (n - 1);
+  const double variance =
+      std::max(0.0, squares / kResamples - sum * sum / kResamples / kResamples) * n / (n - 1);
   // Runs scatter within blocks too: no estimate from N errors is better than 1/(2N) of its square.
   const double least = 1 / (2.0 * static_cast<double>(errors.count()));
   const double half = student_t_quantile(0.975, std::max(n - 1, 3.0)) * std::sqrt(std::max(variance, least));
@@ -84,10 +87,13 @@ void set_interval(const Observations& observations, const HeldOutErrors& errors,
   estimate.held_out_high = estimate.held_out_rmse * std::exp(half);
 }
 
-// --- parameters --------------------------------------------------------------------------------------------------------
+// --- parameters
+// --------------------------------------------------------------------------------------------------------
 
 /// Jackknife over blocks: value and 95 % interval of every parameter of every term.
-std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observations& observations, const JointFit& fit, const std::vector<int>& rows) {
+std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observations& observations,
+                                                                const JointFit& fit,
+                                                                const std::vector<int>& rows) {
   MeanModel free = fit.model;  // theory's coefficients are fitted too, to show what the data say of them
   for (Term& term : free.terms)
     if (!term.effect->theory_only) term.at_theory = false;
@@ -132,10 +138,12 @@ std::string unit_of(const Observations& observations, const EffectParameter& par
   return observations.unit + parameter.unit.substr(1);
 }
 
-// --- curves ------------------------------------------------------------------------------------------------------------
+// --- curves
+// ------------------------------------------------------------------------------------------------------------
 
 /// The curve over its covariate, in the response's unit, with a 95 % band.
-UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found, const std::vector<int>& rows) {
+UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
+                          const std::vector<int>& rows) {
   constexpr int kPoints = 25;
   UnknownStructure result{found.curve.covariate, found.curve.rotor, found.p, 0, {}};
   const Components y = difference(response_components(observations), fit.linear.offset);
@@ -157,7 +165,8 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
     const double u = static_cast<double>(p) / (kPoints - 1);
     VectorXd basis(k);
     for (Index b = 0; b < k; ++b) basis(b) = std::cos(std::numbers::pi * static_cast<double>(b + 1) * u);
-    const double value = scale * basis.dot(amplitude), half = 1.96 * scale * std::sqrt(std::max(0.0, basis.dot(covariance * basis)));
+    const double value = scale * basis.dot(amplitude),
+                 half = 1.96 * scale * std::sqrt(std::max(0.0, basis.dot(covariance * basis)));
     result.shape.push_back({low + u * (high - low), value, value - half, value + half});
     mean += value / kPoints;
   }
@@ -174,7 +183,8 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
 }
 
 /// Session scatter that no covariate explains: the sessions' offsets themselves are the shape.
-UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual, const std::vector<int>& rows) {
+UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual,
+                                   const std::vector<int>& rows) {
   UnknownStructure result{"session", -1, 0.025, 0, {}};
   std::map<int, std::vector<double>> offsets;
   for (std::size_t r = 0; r < rows.size(); ++r) {
@@ -196,9 +206,12 @@ UnknownStructure describe_sessions(const Observations& observations, const Matri
   return result;
 }
 
-// --- what else is to be said -------------------------------------------------------------------------------------------
+// --- what else is to be said
+// -------------------------------------------------------------------------------------------
 
-std::vector<Untestable> untestable_effects(const Observations& observations, const std::vector<const Effect*>& effects, const std::vector<int>& rows) {
+std::vector<Untestable> untestable_effects(const Observations& observations,
+                                           const std::vector<const Effect*>& effects,
+                                           const std::vector<int>& rows) {
   std::map<std::string, std::vector<Untestable>> by_name;
   std::set<std::string> testable;
   const MixedModel mixed(observations, rows, {0});
@@ -224,7 +237,8 @@ std::vector<Untestable> untestable_effects(const Observations& observations, con
           break;
         }
       }
-      if (!seen && reason.empty()) reason = "it does not vary within any location, so the location's coefficient absorbs it";
+      if (!seen && reason.empty())
+        reason = "it does not vary within any location, so the location's coefficient absorbs it";
       if (seen) {
         testable.insert(effect->name);
         continue;
@@ -245,19 +259,27 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
       const Covariate &first = observations.covariates[a], &second = observations.covariates[b];
       if (first.derived && second.derived) continue;
       if (first.value.array().isNaN().any() || second.value.array().isNaN().any()) continue;
-      const VectorXd u = first.value.col(0).array() - first.value.col(0).mean(), v = second.value.col(0).array() - second.value.col(0).mean();
+      const VectorXd u = first.value.col(0).array() - first.value.col(0).mean(),
+                     v = second.value.col(0).array() - second.value.col(0).mean();
       if (u.norm() == 0 || v.norm() == 0) continue;
       const double correlation = u.dot(v) / u.norm() / v.norm();
       if (std::abs(correlation) < 0.999) continue;
-      explanation.warnings.push_back(fmt::format("{} and {} go together (correlation {:.4f}): effects of the two cannot be told apart", first.name, second.name, correlation));
+      explanation.warnings.push_back(
+          fmt::format("{} and {} go together (correlation {:.4f}): effects of the two cannot be told apart",
+                      first.name, second.name, correlation));
       for (const Effect& effect : all_effects())
         for (const std::string& covariate : effect.covariates)
           if (covariate == second.name || covariate == first.name)
-            explanation.untestable.push_back({effect.name, fmt::format("{} is collinear with {}: it is tried, but not on its own", covariate, covariate == first.name ? second.name : first.name), {}});
+            explanation.untestable.push_back(
+                {effect.name,
+                 fmt::format("{} is collinear with {}: it is tried, but not on its own", covariate,
+                             covariate == first.name ? second.name : first.name),
+                 {}});
     }
   std::vector<Untestable> once;
   for (const Untestable& entry : explanation.untestable)
-    if (std::none_of(once.begin(), once.end(), [&](const Untestable& u) { return u.effect == entry.effect; })) once.push_back(entry);
+    if (std::none_of(once.begin(), once.end(), [&](const Untestable& u) { return u.effect == entry.effect; }))
+      once.push_back(entry);
   explanation.untestable = std::move(once);
 }
 
@@ -271,7 +293,8 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
       const double z = errors.error(static_cast<Index>(r), c) / errors.expected_std(static_cast<Index>(r), c);
       if (std::abs(z) > std::abs(worst)) worst = -z;  // measured less predicted
     }
-    if (std::abs(worst) > limit) result.push_back({observations.name[static_cast<std::size_t>(errors.rows[r])], worst});
+    if (std::abs(worst) > limit)
+      result.push_back({observations.name[static_cast<std::size_t>(errors.rows[r])], worst});
   }
   return result;
 }
@@ -279,7 +302,8 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
 std::string verdict_of(const Explanation& explanation) {
   if (explanation.adopted.empty()) return explanation.unknown.empty() ? "no_structure" : "unknown";
   if (!explanation.unknown.empty()) return "partly_explained";
-  const bool confounded = std::any_of(explanation.adopted.begin(), explanation.adopted.end(), [](const AdoptedEffect& a) { return !a.confounded_with.empty(); });
+  const bool confounded = std::any_of(explanation.adopted.begin(), explanation.adopted.end(),
+                                      [](const AdoptedEffect& a) { return !a.confounded_with.empty(); });
   return confounded ? "confounded" : "explained";
 }
 
@@ -289,40 +313,55 @@ void explain_too_few(const Observations& observations, Explanation& explanation)
   const JointFit fit = fit_jointly(observations, {}, rows);
   explanation.residual_before = explanation.residual_after = residuals(observations, fit, rows);
   explanation.before.rmse = rms(explanation.residual_before);
-  explanation.before.held_out_rmse = explanation.before.held_out_low = explanation.before.held_out_high = explanation.before.rmse;
+  explanation.before.held_out_rmse = explanation.before.held_out_low = explanation.before.held_out_high =
+      explanation.before.rmse;
   explanation.noise_floor = explanation.before.rmse;
   if (observations.blocks() > 1) {
-    const CrossValidation validation = cross_validate(observations, response_components(observations), {}, fit.variances, rows);
+    const CrossValidation validation =
+        cross_validate(observations, response_components(observations), {}, fit.variances, rows);
     if (const double rmse = validation.rmse(); !std::isnan(rmse))
-      explanation.before.held_out_rmse = explanation.before.held_out_low = explanation.before.held_out_high = rmse;
+      explanation.before.held_out_rmse = explanation.before.held_out_low = explanation.before.held_out_high =
+          rmse;
   }
   explanation.after = explanation.before;
   explanation.verdict = "insufficient";
-  explanation.warnings.push_back(fmt::format("{} blocks are too few to tell an effect from chance; {} are needed", observations.blocks(), kFewestBlocks));
+  explanation.warnings.push_back(
+      fmt::format("{} blocks are too few to tell an effect from chance; {} are needed", observations.blocks(),
+                  kFewestBlocks));
 }
 
-void report_adopted(const Observations& observations, const Attribution& found, const JointFit& whole, const std::vector<int>& rows, Explanation& explanation) {
+void report_adopted(const Observations& observations, const Attribution& found, const JointFit& whole,
+                    const std::vector<int>& rows, Explanation& explanation) {
   const auto parameters = estimate_parameters(observations, whole, rows);
   for (std::size_t t = 0; t < found.accepted.size(); ++t) {
     const Accepted& accepted = found.accepted[t];
     AdoptedEffect adopted{whole.model.terms[t], parameters[t], accepted.p, accepted.gain, {}, {}};
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k)
       adopted.parameters[k].unit = unit_of(observations, adopted.term.effect->parameters[k]);
-    for (const Ranked& rival : accepted.confounded) adopted.confounded_with.push_back(rival.term.effect->name);
+    for (const Ranked& rival : accepted.confounded)
+      adopted.confounded_with.push_back(rival.term.effect->name);
     if (!accepted.confounded.empty())
-      adopted.separating_run = separating_run(observations, accepted.term, accepted.confounded[0].term, found.final, rows);
+      adopted.separating_run =
+          separating_run(observations, accepted.term, accepted.confounded[0].term, found.final, rows);
     explanation.adopted.push_back(std::move(adopted));
   }
 }
 
 }  // namespace
 
-Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects, const SearchSettings& settings) {
-  Explanation explanation{.campaign = observations.campaign, .response = observations.response, .unit = observations.unit,
-                          .baseline = observations.baseline, .verdict = {}, .blocks = observations.blocks(),
-                          .runs = static_cast<int>(observations.rows()), .model = {}};
+Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
+                    const SearchSettings& settings) {
+  Explanation explanation{.campaign = observations.campaign,
+                          .response = observations.response,
+                          .unit = observations.unit,
+                          .baseline = observations.baseline,
+                          .verdict = {},
+                          .blocks = observations.blocks(),
+                          .runs = static_cast<int>(observations.rows()),
+                          .model = {}};
   explanation.warnings = observations.left_out;
-  for (const auto& [covariate, why] : observations.not_usable) explanation.warnings.push_back(covariate + " is " + why);
+  for (const auto& [covariate, why] : observations.not_usable)
+    explanation.warnings.push_back(covariate + " is " + why);
   const std::vector<int> rows = all_rows(observations);
   explanation.untestable = untestable_effects(observations, effects, rows);
   warn_of_collinear(observations, explanation);
@@ -332,14 +371,16 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
   }
 
   const Seal seal = seal_blocks(observations, settings.seed);
-  for (const std::string& group : seal.only_sealed) explanation.warnings.push_back(group + " has runs in sealed blocks only: it is not scored");
+  for (const std::string& group : seal.only_sealed)
+    explanation.warnings.push_back(group + " has runs in sealed blocks only: it is not scored");
   const Attribution found = attribute(observations, seal.open, effects, settings);
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
   const double scale = observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
   explanation.detectable = found.detectable_sigma * scale;
 
-  // The seal is opened: nothing that was decided above changes any more. Curves have no name, so they are not part of "after".
+  // The seal is opened: nothing that was decided above changes any more. Curves have no name, so they are not
+  // part of "after".
   JointFit named = found.final;
   if (!found.curves.empty()) {
     MeanModel terms = found.final.model;
@@ -350,7 +391,8 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
   const HeldOutErrors after = score(observations, named, named.variances, seal.open, seal.sealed);
   set_interval(observations, before, settings.seed, explanation.before);
   set_interval(observations, after, settings.seed, explanation.after);
-  explanation.noise_floor = rms(score(observations, found.final, found.final.variances, seal.open, seal.sealed).expected_std);
+  explanation.noise_floor =
+      rms(score(observations, found.final, found.final.variances, seal.open, seal.sealed).expected_std);
   explanation.before.rmse = rms(residuals(observations, found.baseline, seal.open));
   explanation.after.rmse = rms(residuals(observations, named, seal.open));
 
@@ -362,8 +404,10 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
   const HeldOutErrors fitted = score(observations, whole, whole.variances, rows, rows);
   explanation.residual_after = fitted.error;
   report_adopted(observations, found, whole, rows, explanation);
-  for (const FoundCurve& curve : found.curves) explanation.unknown.push_back(describe(observations, whole, curve, rows));
-  if (found.session_unknown && found.curves.empty()) explanation.unknown.push_back(describe_sessions(observations, fitted.error, rows));
+  for (const FoundCurve& curve : found.curves)
+    explanation.unknown.push_back(describe(observations, whole, curve, rows));
+  if (found.session_unknown && found.curves.empty())
+    explanation.unknown.push_back(describe_sessions(observations, fitted.error, rows));
   explanation.suspect_rows = suspect_rows(observations, fitted);
   explanation.verdict = verdict_of(explanation);
   return explanation;

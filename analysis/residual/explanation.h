@@ -77,15 +77,17 @@ struct Explanation {
   // what the pages show beside it
   std::vector<Round> rounds, curve_rounds;
   std::vector<std::vector<std::string>> residual_plots;
-  MeanModel model;  // fitted to all runs
+  MeanModel model;                                  // fitted to all runs
   Eigen::MatrixXd residual_before, residual_after;  // n × c, unit of the response
 };
 
 /// The protocol: seal, search on the open runs, open the seal once, estimate on all.
-Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects, const SearchSettings& settings);
+Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
+                    const SearchSettings& settings);
 
 /// The setting that tells `first` from `second` best, among conditions the rig has nearly seen.
-std::optional<SeparatingRun> separating_run(const Observations& observations, const Term& first, const Term& second,
-                                            const JointFit& fit, const std::vector<int>& rows);
+std::optional<SeparatingRun> separating_run(const Observations& observations, const Term& first,
+                                            const Term& second, const JointFit& fit,
+                                            const std::vector<int>& rows);
 
 }  // namespace tunnelrig

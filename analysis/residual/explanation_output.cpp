@@ -31,33 +31,39 @@ Json adopted_json(const AdoptedEffect& adopted) {
   }
   Json separating = nullptr;
   if (const auto& run = adopted.separating_run) {
-    separating = {{"setting", Json::object()}, {"location", run->location}, {"expected_sigma", finite(run->expected_sigma)}, {"text", run->text}};
+    separating = {{"setting", Json::object()},
+                  {"location", run->location},
+                  {"expected_sigma", finite(run->expected_sigma)},
+                  {"text", run->text}};
     for (const auto& [name, value] : run->setting) separating["setting"][name] = value;
   }
-  Json json{{"effect", adopted.term.effect->name},
-            {"form", adopted.term.effect->form},
-            {"rotor", rotor_json(adopted.term.rotor)},
-            {"parameters", parameters},
-            {"p_value", finite(adopted.p_value)},
-            {"held_out_gain", finite(adopted.held_out_gain)},
-            {"confounded_with", adopted.confounded_with},
-            {"separating_run", separating}};
+  Json json{{"effect", adopted.term.effect->name},        {"form", adopted.term.effect->form},
+            {"rotor", rotor_json(adopted.term.rotor)},    {"parameters", parameters},
+            {"p_value", finite(adopted.p_value)},         {"held_out_gain", finite(adopted.held_out_gain)},
+            {"confounded_with", adopted.confounded_with}, {"separating_run", separating}};
   if (adopted.term.other >= 0) json["from_rotor"] = adopted.term.other + 1;
   return json;
 }
 
 Json unknown_json(const UnknownStructure& unknown) {
   Json shape = Json::array();
-  for (const ShapePoint& point : unknown.shape) shape.push_back({finite(point.x), finite(point.y), finite(point.low), finite(point.high)});
-  return {{"covariate", unknown.covariate}, {"rotor", rotor_json(unknown.rotor)}, {"p_value", finite(unknown.p_value)},
-          {"amplitude", finite(unknown.amplitude)}, {"shape", shape}};
+  for (const ShapePoint& point : unknown.shape)
+    shape.push_back({finite(point.x), finite(point.y), finite(point.low), finite(point.high)});
+  return {{"covariate", unknown.covariate},
+          {"rotor", rotor_json(unknown.rotor)},
+          {"p_value", finite(unknown.p_value)},
+          {"amplitude", finite(unknown.amplitude)},
+          {"shape", shape}};
 }
 
 std::string verdict_in_words(const std::string& verdict) {
   if (verdict == "explained") return "The effects below explain what the model lacked.";
-  if (verdict == "partly_explained") return "The effects below explain a part; structure without a name remains.";
-  if (verdict == "confounded") return "An effect is there, but these data cannot tell which of several it is.";
-  if (verdict == "unknown") return "There is structure, but no candidate accounts for it: the cause is not known.";
+  if (verdict == "partly_explained")
+    return "The effects below explain a part; structure without a name remains.";
+  if (verdict == "confounded")
+    return "An effect is there, but these data cannot tell which of several it is.";
+  if (verdict == "unknown")
+    return "There is structure, but no candidate accounts for it: the cause is not known.";
   if (verdict == "no_structure") return "Nothing beyond chance was found.";
   return "There are too few blocks to say anything.";
 }
@@ -65,8 +71,9 @@ std::string verdict_in_words(const std::string& verdict) {
 std::string parameters_in_words(const AdoptedEffect& adopted) {
   std::string text;
   for (const ParameterEstimate& parameter : adopted.parameters) {
-    text += fmt::format("{}{} = {:.4g} {} [{:.4g}, {:.4g}]{}", text.empty() ? "" : ", ", parameter.name, parameter.value,
-                        parameter.unit == "1" ? "" : parameter.unit, parameter.low, parameter.high, parameter.theory ? " (theory)" : "");
+    text += fmt::format("{}{} = {:.4g} {} [{:.4g}, {:.4g}]{}", text.empty() ? "" : ", ", parameter.name,
+                        parameter.value, parameter.unit == "1" ? "" : parameter.unit, parameter.low,
+                        parameter.high, parameter.theory ? " (theory)" : "");
   }
   return text;
 }
@@ -80,57 +87,89 @@ std::string joined(const std::vector<std::string>& words) {
 }  // namespace
 
 std::string explanation_json(const Explanation& e) {
-  Json json{{"format", "tunnelrig-explain/1"}, {"campaign", e.campaign}, {"response", e.response}, {"unit", e.unit},
-            {"baseline", e.baseline}, {"verdict", e.verdict}, {"noise_floor", finite(e.noise_floor)}, {"blocks", e.blocks}, {"runs", e.runs},
-            {"before", error_json(e.before)}, {"after", error_json(e.after)},
-            {"adopted", Json::array()}, {"unknown", Json::array()}, {"untestable", Json::array()}, {"suspect_rows", Json::array()},
-            {"detectable_at_80_percent_power", finite(e.detectable)}, {"warnings", e.warnings}};
+  Json json{{"format", "tunnelrig-explain/1"},
+            {"campaign", e.campaign},
+            {"response", e.response},
+            {"unit", e.unit},
+            {"baseline", e.baseline},
+            {"verdict", e.verdict},
+            {"noise_floor", finite(e.noise_floor)},
+            {"blocks", e.blocks},
+            {"runs", e.runs},
+            {"before", error_json(e.before)},
+            {"after", error_json(e.after)},
+            {"adopted", Json::array()},
+            {"unknown", Json::array()},
+            {"untestable", Json::array()},
+            {"suspect_rows", Json::array()},
+            {"detectable_at_80_percent_power", finite(e.detectable)},
+            {"warnings", e.warnings}};
   for (const AdoptedEffect& adopted : e.adopted) json["adopted"].push_back(adopted_json(adopted));
   for (const UnknownStructure& unknown : e.unknown) json["unknown"].push_back(unknown_json(unknown));
-  for (const Untestable& entry : e.untestable) json["untestable"].push_back({{"effect", entry.effect}, {"missing", entry.missing}, {"reason", entry.reason}});
-  for (const SuspectRow& row : e.suspect_rows) json["suspect_rows"].push_back({{"row", row.row}, {"studentised", finite(row.studentised)}});
+  for (const Untestable& entry : e.untestable)
+    json["untestable"].push_back(
+        {{"effect", entry.effect}, {"missing", entry.missing}, {"reason", entry.reason}});
+  for (const SuspectRow& row : e.suspect_rows)
+    json["suspect_rows"].push_back({{"row", row.row}, {"studentised", finite(row.studentised)}});
   return json.dump(1);
 }
 
 std::string explanation_text(const Explanation& e) {
   const std::string unit = e.unit == "1" ? "" : " " + e.unit;
-  std::string text = fmt::format("{}: response {}, baseline {}, {} runs in {} blocks\n\n{}: {}\n", e.campaign, e.response, e.baseline, e.runs,
-                                 e.blocks, e.verdict, verdict_in_words(e.verdict));
+  std::string text =
+      fmt::format("{}: response {}, baseline {}, {} runs in {} blocks\n\n{}: {}\n", e.campaign, e.response,
+                  e.baseline, e.runs, e.blocks, e.verdict, verdict_in_words(e.verdict));
   for (const AdoptedEffect& a : e.adopted) {
-    text += fmt::format("\n  {}   p = {:.3g}\n    {}\n    {}\n", a.term.label(), a.p_value, a.term.effect->formula, parameters_in_words(a));
-    if (!a.confounded_with.empty()) text += fmt::format("    not to be told from: {}\n", joined(a.confounded_with));
+    text += fmt::format("\n  {}   p = {:.3g}\n    {}\n    {}\n", a.term.label(), a.p_value,
+                        a.term.effect->formula, parameters_in_words(a));
+    if (!a.confounded_with.empty())
+      text += fmt::format("    not to be told from: {}\n", joined(a.confounded_with));
     if (a.separating_run) text += fmt::format("    would tell: {}\n", a.separating_run->text);
   }
   for (const UnknownStructure& u : e.unknown) {
     text += fmt::format("\n  unknown: depends on {}{}, amplitude {:.3g}{}, p = {:.3g}\n", u.covariate,
-                        u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit, u.p_value);
+                        u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit,
+                        u.p_value);
   }
-  text += fmt::format("\nerror on blocks held out{}: before {:.4g} [{:.4g}, {:.4g}], after {:.4g} [{:.4g}, {:.4g}], noise floor {:.4g}\n", unit.empty() ? "" : " [" + e.unit + "]",
-                      e.before.held_out_rmse, e.before.held_out_low, e.before.held_out_high, e.after.held_out_rmse, e.after.held_out_low,
-                      e.after.held_out_high, e.noise_floor);
-  if (e.verdict == "no_structure") text += fmt::format("no effect above {:.3g}{} (rms) at 80 % power\n", e.detectable, unit);
+  text += fmt::format(
+      "\nerror on blocks held out{}: before {:.4g} [{:.4g}, {:.4g}], after {:.4g} [{:.4g}, {:.4g}], noise "
+      "floor {:.4g}\n",
+      unit.empty() ? "" : " [" + e.unit + "]", e.before.held_out_rmse, e.before.held_out_low,
+      e.before.held_out_high, e.after.held_out_rmse, e.after.held_out_low, e.after.held_out_high,
+      e.noise_floor);
+  if (e.verdict == "no_structure")
+    text += fmt::format("no effect above {:.3g}{} (rms) at 80 % power\n", e.detectable, unit);
   if (!e.untestable.empty()) {
     text += "\nnot testable with these data:\n";
     for (const Untestable& u : e.untestable)
-      text += fmt::format("  {:<24}{}\n", u.effect, u.missing.empty() ? u.reason : "needs " + joined(u.missing));
+      text +=
+          fmt::format("  {:<24}{}\n", u.effect, u.missing.empty() ? u.reason : "needs " + joined(u.missing));
   }
-  for (const SuspectRow& row : e.suspect_rows) text += fmt::format("suspect: {} is {:.1f} standard deviations off\n", row.row, row.studentised);
+  for (const SuspectRow& row : e.suspect_rows)
+    text += fmt::format("suspect: {} is {:.1f} standard deviations off\n", row.row, row.studentised);
   return text;
 }
 
 std::string candidates_text(const std::vector<const Effect*>& effects, const Observations* observations) {
   std::string text;
   for (const Effect* effect : effects) {
-    text += fmt::format("{}{}\n    {}\n    {}\n", effect->name, effect->form.empty() ? "" : " (" + effect->form + ")", effect->formula, effect->physics);
+    text +=
+        fmt::format("{}{}\n    {}\n    {}\n", effect->name,
+                    effect->form.empty() ? "" : " (" + effect->form + ")", effect->formula, effect->physics);
     for (const EffectParameter& p : effect->parameters) {
-      text += p.role == ParameterRole::kChangePoint ? fmt::format("    {}: at a session's first run\n", p.name)
-                                                    : fmt::format("    {} [{}] from {} to {}{}\n", p.name, p.unit, p.lower, p.upper,
-                                                                  p.theory ? fmt::format(", theory {}", *p.theory) : "");
+      text += p.role == ParameterRole::kChangePoint
+                  ? fmt::format("    {}: at a session's first run\n", p.name)
+                  : fmt::format("    {} [{}] from {} to {}{}\n", p.name, p.unit, p.lower, p.upper,
+                                p.theory ? fmt::format(", theory {}", *p.theory) : "");
     }
-    text += fmt::format("    sign: {}\n    needs: {}\n", effect->sign_rule, effect->covariates.empty() ? "nothing measured" : joined(effect->covariates));
+    text += fmt::format("    sign: {}\n    needs: {}\n", effect->sign_rule,
+                        effect->covariates.empty() ? "nothing measured" : joined(effect->covariates));
     if (observations != nullptr) {
       const Testability can = testability(*effect, *observations);
-      text += can.ok() ? "    testable\n" : fmt::format("    not testable: {}\n", can.missing.empty() ? can.reason : "not recorded: " + joined(can.missing));
+      text += can.ok()
+                  ? "    testable\n"
+                  : fmt::format("    not testable: {}\n",
+                                can.missing.empty() ? can.reason : "not recorded: " + joined(can.missing));
     }
   }
   return text;
@@ -141,9 +180,14 @@ std::string candidates_json(const std::vector<const Effect*>& effects, const Obs
   for (const Effect* effect : effects) {
     Json parameters = Json::array();
     for (const EffectParameter& p : effect->parameters)
-      parameters.push_back({{"name", p.name}, {"unit", p.unit}, {"lower", p.lower}, {"upper", p.upper}, {"theory", p.theory ? Json(*p.theory) : Json(nullptr)}});
-    Json entry{{"effect", effect->name}, {"form", effect->form}, {"formula", effect->formula}, {"physics", effect->physics},
-               {"parameters", parameters}, {"covariates", effect->covariates}, {"sign", effect->sign_rule}};
+      parameters.push_back({{"name", p.name},
+                            {"unit", p.unit},
+                            {"lower", p.lower},
+                            {"upper", p.upper},
+                            {"theory", p.theory ? Json(*p.theory) : Json(nullptr)}});
+    Json entry{{"effect", effect->name},     {"form", effect->form},     {"formula", effect->formula},
+               {"physics", effect->physics}, {"parameters", parameters}, {"covariates", effect->covariates},
+               {"sign", effect->sign_rule}};
     if (observations != nullptr) {
       const Testability can = testability(*effect, *observations);
       entry["testable"] = can.ok();

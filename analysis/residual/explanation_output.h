@@ -16,7 +16,8 @@ std::string explanation_text(const Explanation& explanation);
 /// One self-contained page: residuals against covariates before and after, the ranking, null distributions.
 std::string explanation_html(const Explanation& explanation, const Observations& observations);
 
-/// Every candidate with formula, parameters, what it needs, and whether these data can test it (null: no data).
+/// Every candidate with formula, parameters, what it needs, and whether these data can test it (null: no
+/// data).
 std::string candidates_text(const std::vector<const Effect*>& effects, const Observations* observations);
 std::string candidates_json(const std::vector<const Effect*>& effects, const Observations* observations);
 

@@ -18,11 +18,12 @@ constexpr std::size_t kMostFolds = 24;
 /// What the fit leaves for prediction: everything stratum by stratum.
 struct Fit {
   VectorXd amplitude;
-  MatrixXd covariance;                // of the amplitudes
-  std::vector<Stacked> y, columns;    // of the fitted runs
+  MatrixXd covariance;              // of the amplitudes
+  std::vector<Stacked> y, columns;  // of the fitted runs
 };
 
-Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vector<const Components*>& items, const NullFit& null) {
+Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vector<const Components*>& items,
+                   const NullFit& null) {
   const Index k = static_cast<Index>(items.size());
   Fit fit{VectorXd::Zero(k), MatrixXd::Zero(k, k), {}, {}};
   MatrixXd a = MatrixXd::Zero(k, k);
@@ -46,10 +47,11 @@ Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vect
   return fit;
 }
 
-/// Where whole groups are held out, a group's constant is the mean over every other run of it; the rest is scored.
-/// `residual` came with NaN there because the model has no such group: `plain` is the same without any baseline.
-void own_constants(const Observations& observations, const std::vector<int>& rows, const MatrixXd& plain, double sigma2,
-                   MatrixXd& residual, MatrixXd& variance) {
+/// Where whole groups are held out, a group's constant is the mean over every other run of it; the rest is
+/// scored. `residual` came with NaN there because the model has no such group: `plain` is the same without
+/// any baseline.
+void own_constants(const Observations& observations, const std::vector<int>& rows, const MatrixXd& plain,
+                   double sigma2, MatrixXd& residual, MatrixXd& variance) {
   std::map<int, std::vector<Index>> runs;
   for (std::size_t r = 0; r < rows.size(); ++r)
     if (std::isnan(residual(static_cast<Index>(r), 0)))
@@ -66,7 +68,8 @@ void own_constants(const Observations& observations, const std::vector<int>& row
 }
 
 /// eᵀV⁻¹e of one stratum, block by block; V = σ²(I + a 11ᵀ).
-double mahalanobis(const Observations& observations, const std::vector<int>& rows, const MatrixXd& error, double sigma, double ratio) {
+double mahalanobis(const Observations& observations, const std::vector<int>& rows, const MatrixXd& error,
+                   double sigma, double ratio) {
   double sum = 0;
   for (Index mode = 0; mode < error.cols(); ++mode) {
     std::map<int, std::array<double, 3>> blocks;  // n, Σe, Σe²
@@ -85,22 +88,22 @@ double mahalanobis(const Observations& observations, const std::vector<int>& row
 
 }  // namespace
 
-double HeldOutErrors::sum_of_squares() const {
-  return error.array().isNaN().select(0, error).squaredNorm();
-}
+double HeldOutErrors::sum_of_squares() const { return error.array().isNaN().select(0, error).squaredNorm(); }
 
 Index HeldOutErrors::count() const { return error.size() - error.array().isNaN().count(); }
 
-AmplitudeFit fit_amplitudes(const Observations& observations, const Components& y, const std::vector<Components>& columns,
-                            const NullFit& null, const std::vector<int>& rows) {
+AmplitudeFit fit_amplitudes(const Observations& observations, const Components& y,
+                            const std::vector<Components>& columns, const NullFit& null,
+                            const std::vector<int>& rows) {
   std::vector<const Components*> items;
   for (const Components& column : columns) items.push_back(&column);
   const Fit fit = fit_amplitudes(MixedModel(observations, rows, null.ratio), y, items, null);
   return {fit.amplitude, fit.covariance};
 }
 
-HeldOutErrors predict_held_out(const Observations& observations, const Components& y, const std::vector<Components>& columns,
-                               const NullFit& null, const std::vector<int>& fit_rows, const std::vector<int>& test_rows) {
+HeldOutErrors predict_held_out(const Observations& observations, const Components& y,
+                               const std::vector<Components>& columns, const NullFit& null,
+                               const std::vector<int>& fit_rows, const std::vector<int>& test_rows) {
   const MixedModel model(observations, fit_rows, null.ratio);
   const MixedModel test(observations, test_rows, {0});
   std::vector<const Components*> items;
@@ -127,7 +130,8 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     MatrixXd errors = Eigen::Map<const MatrixXd>(residual.data(), n, stratum.modes);
     MatrixXd variances = Eigen::Map<const MatrixXd>(variance.data(), n, stratum.modes);
     if (stratum.means() && observations.groups_within_blocks)
-      own_constants(observations, test_rows, Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes), sigma2, errors, variances);
+      own_constants(observations, test_rows, Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes),
+                    sigma2, errors, variances);
     result.loss += mahalanobis(observations, test_rows, errors, null.sigma[s], kRatios[null.ratio[s]]);
     if (!stratum.means()) continue;
     error_by_mode.middleCols(stratum.first_mode, stratum.modes) = errors;
@@ -138,15 +142,18 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
   for (Index r = 0; r < n; ++r)
     for (Index channel = 0; channel < c; ++channel) {
       const double value = observations.value(test_rows[static_cast<std::size_t>(r)], channel);
-      const double predicted = observations.multiplicative ? value * std::exp(-error_y(r, channel)) : value - error_y(r, channel);
+      const double predicted =
+          observations.multiplicative ? value * std::exp(-error_y(r, channel)) : value - error_y(r, channel);
       result.error(r, channel) = predicted - value;
-      result.expected_std(r, channel) = (observations.multiplicative ? std::abs(predicted) : 1) * std_y(r, channel);
+      result.expected_std(r, channel) =
+          (observations.multiplicative ? std::abs(predicted) : 1) * std_y(r, channel);
     }
   return result;
 }
 
-CrossValidation cross_validate(const Observations& observations, const Components& y, const std::vector<Components>& columns,
-                               const NullFit& null, const std::vector<int>& rows) {
+CrossValidation cross_validate(const Observations& observations, const Components& y,
+                               const std::vector<Components>& columns, const NullFit& null,
+                               const std::vector<int>& rows) {
   std::map<int, std::size_t> fold_of;
   for (const int row : rows) fold_of.emplace(observations.block[static_cast<std::size_t>(row)], 0);
   std::size_t next = 0;
@@ -154,7 +161,8 @@ CrossValidation cross_validate(const Observations& observations, const Component
   CrossValidation result;
   for (std::size_t fold = 0; fold < std::min(fold_of.size(), kMostFolds); ++fold) {
     std::vector<int> fit, test;
-    for (const int row : rows) (fold_of.at(observations.block[static_cast<std::size_t>(row)]) == fold ? test : fit).push_back(row);
+    for (const int row : rows)
+      (fold_of.at(observations.block[static_cast<std::size_t>(row)]) == fold ? test : fit).push_back(row);
     result.folds.push_back(predict_held_out(observations, y, columns, null, fit, test));
   }
   return result;

@@ -7,15 +7,18 @@
 
 namespace tunnelrig {
 
-/// Errors of the held-out runs. A run whose group the fit did not see has none, and is left out of every figure.
+/// Errors of the held-out runs. A run whose group the fit did not see has none, and is left out of every
+/// figure.
 struct HeldOutErrors {
   std::vector<int> rows;
-  Eigen::MatrixXd error;           // rows × channels, response's unit, predicted less measured; NaN where there is none
-  Eigen::MatrixXd expected_std;    // what the error would scatter by if the mean model were exact, unit as above
-  double loss = 0;                 // eᵀV⁻¹e over all strata: what models are compared by
-  Eigen::VectorXd amplitude;       // of the columns, from the fit
+  Eigen::MatrixXd
+      error;  // rows × channels, response's unit, predicted less measured; NaN where there is none
+  Eigen::MatrixXd
+      expected_std;           // what the error would scatter by if the mean model were exact, unit as above
+  double loss = 0;            // eᵀV⁻¹e over all strata: what models are compared by
+  Eigen::VectorXd amplitude;  // of the columns, from the fit
 
-  double sum_of_squares() const;   // of the errors that there are
+  double sum_of_squares() const;  // of the errors that there are
   Eigen::Index count() const;
 };
 
@@ -24,24 +27,28 @@ struct AmplitudeFit {
   Eigen::VectorXd amplitude;
   Eigen::MatrixXd covariance;
 };
-AmplitudeFit fit_amplitudes(const Observations& observations, const Components& y, const std::vector<Components>& columns,
-                            const NullFit& null, const std::vector<int>& rows);
+AmplitudeFit fit_amplitudes(const Observations& observations, const Components& y,
+                            const std::vector<Components>& columns, const NullFit& null,
+                            const std::vector<int>& rows);
 
-/// Fits group constants and the columns' amplitudes to y of `fit_rows` by generalised least squares with the variances
-/// of `null`, then predicts `test_rows`. Where a test run's group was not seen but the groups lie within blocks, the
-/// group's constant comes from every other run of it and the errors from the rest.
-HeldOutErrors predict_held_out(const Observations& observations, const Components& y, const std::vector<Components>& columns,
-                               const NullFit& null, const std::vector<int>& fit_rows, const std::vector<int>& test_rows);
+/// Fits group constants and the columns' amplitudes to y of `fit_rows` by generalised least squares with the
+/// variances of `null`, then predicts `test_rows`. Where a test run's group was not seen but the groups lie
+/// within blocks, the group's constant comes from every other run of it and the errors from the rest.
+HeldOutErrors predict_held_out(const Observations& observations, const Components& y,
+                               const std::vector<Components>& columns, const NullFit& null,
+                               const std::vector<int>& fit_rows, const std::vector<int>& test_rows);
 
-/// Leave-one-block-out over the blocks of `rows` (of at most `most` folds: blocks are dealt out where there are more).
+/// Leave-one-block-out over the blocks of `rows` (of at most `most` folds: blocks are dealt out where there
+/// are more).
 struct CrossValidation {
   std::vector<HeldOutErrors> folds;
 
   double rmse() const;
   Eigen::VectorXd losses() const;  // of the folds
 };
-CrossValidation cross_validate(const Observations& observations, const Components& y, const std::vector<Components>& columns,
-                               const NullFit& null, const std::vector<int>& rows);
+CrossValidation cross_validate(const Observations& observations, const Components& y,
+                               const std::vector<Components>& columns, const NullFit& null,
+                               const std::vector<int>& rows);
 
 /// Mean difference of two models' losses over the folds, and its standard error: `worse` less `better`.
 struct LossDifference {

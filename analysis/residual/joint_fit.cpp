@@ -35,7 +35,8 @@ std::vector<FreeParameter> free_parameters(const MeanModel& model) {
 /// All strata below each other, whitened, over σ, without what baseline and curves can absorb.
 class Whitener {
  public:
-  Whitener(const MixedModel& model, const NullFit& null, const std::vector<Curve>& curves) : model_(model), null_(null) {
+  Whitener(const MixedModel& model, const NullFit& null, const std::vector<Curve>& curves)
+      : model_(model), null_(null) {
     std::vector<const Components*> items;
     for (const Curve& curve : curves)
       for (const Components& column : curve.columns) items.push_back(&column);
@@ -78,8 +79,13 @@ class Whitener {
 /// R(y − Σ terms) and its derivatives by the free parameters.
 class Residuals : public ceres::CostFunction {
  public:
-  Residuals(const Observations& observations, const MeanModel& start, const Whitener& whitener, const MatrixXd& predicted)
-      : observations_(observations), model_(start), free_(free_parameters(start)), whitener_(whitener), predicted_(predicted) {
+  Residuals(const Observations& observations, const MeanModel& start, const Whitener& whitener,
+            const MatrixXd& predicted)
+      : observations_(observations),
+        model_(start),
+        free_(free_parameters(start)),
+        whitener_(whitener),
+        predicted_(predicted) {
     const Components y = response_components(observations);
     y_ = whitener_({&y}).col(0);
     set_num_residuals(static_cast<int>(y_.size()));
@@ -88,7 +94,8 @@ class Residuals : public ceres::CostFunction {
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     MeanModel model = model_;
-    for (std::size_t i = 0; i < free_.size(); ++i) model.terms[free_[i].term].parameters[free_[i].parameter] = parameters[0][i];
+    for (std::size_t i = 0; i < free_.size(); ++i)
+      model.terms[free_[i].term].parameters[free_[i].parameter] = parameters[0][i];
     const LinearModel linear = linearise(observations_, {model.terms, {}}, predicted_);
     std::vector<const Components*> items = {&linear.offset};
     for (const Components& column : linear.columns) items.push_back(&column);
@@ -96,7 +103,8 @@ class Residuals : public ceres::CostFunction {
     Eigen::Map<VectorXd>(residuals, y_.size()) = y_ - whitened.col(0);
     if (jacobians != nullptr && jacobians[0] != nullptr) {
       Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-          jacobians[0], y_.size(), static_cast<Index>(free_.size())) = -whitened.rightCols(static_cast<Index>(free_.size()));
+          jacobians[0], y_.size(), static_cast<Index>(free_.size())) =
+          -whitened.rightCols(static_cast<Index>(free_.size()));
     }
     return Eigen::Map<VectorXd>(residuals, y_.size()).allFinite();
   }
@@ -110,7 +118,8 @@ class Residuals : public ceres::CostFunction {
   VectorXd y_;
 };
 
-bool solve(const Observations& observations, MeanModel& model, const Whitener& whitener, const MatrixXd& predicted) {
+bool solve(const Observations& observations, MeanModel& model, const Whitener& whitener,
+           const MatrixXd& predicted) {
   const std::vector<FreeParameter> free = free_parameters(model);
   if (free.empty()) return true;
   std::vector<double> values;
@@ -130,7 +139,8 @@ bool solve(const Observations& observations, MeanModel& model, const Whitener& w
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
-  for (std::size_t i = 0; i < free.size(); ++i) model.terms[free[i].term].parameters[free[i].parameter] = values[i];
+  for (std::size_t i = 0; i < free.size(); ++i)
+    model.terms[free[i].term].parameters[free[i].parameter] = values[i];
   return summary.IsSolutionUsable();
 }
 
@@ -148,7 +158,8 @@ Components difference(const Components& a, const Components& b) {
   return result;
 }
 
-MatrixXd predict_response(const Observations& observations, const MeanModel& model, const std::vector<int>& rows) {
+MatrixXd predict_response(const Observations& observations, const MeanModel& model,
+                          const std::vector<int>& rows) {
   MatrixXd predicted = observations.value;  // only to begin with: replaced by the constants' prediction below
   for (int pass = 0; pass < 2; ++pass) {
     MatrixXd residual = observations.y;
@@ -165,9 +176,11 @@ MatrixXd predict_response(const Observations& observations, const MeanModel& mod
     const Eigen::RowVectorXd overall = sum.colwise().sum() / count.sum();
     for (Index row = 0; row < residual.rows(); ++row) {
       const Index group = observations.group[static_cast<std::size_t>(row)];
-      const Eigen::RowVectorXd constant = count(group) > 0 ? Eigen::RowVectorXd(sum.row(group) / count(group)) : overall;
+      const Eigen::RowVectorXd constant =
+          count(group) > 0 ? Eigen::RowVectorXd(sum.row(group) / count(group)) : overall;
       predicted.row(row) = observations.multiplicative
-                               ? Eigen::RowVectorXd(observations.known.row(row).array() * (constant + added.row(row)).array().exp())
+                               ? Eigen::RowVectorXd(observations.known.row(row).array() *
+                                                    (constant + added.row(row)).array().exp())
                                : Eigen::RowVectorXd(constant + added.row(row));
     }
   }
@@ -175,18 +188,22 @@ MatrixXd predict_response(const Observations& observations, const MeanModel& mod
 }
 
 LinearModel linearise(const Observations& observations, const MeanModel& model, const MatrixXd& predicted) {
-  LinearModel linear{Components(1 + observations.shape.size(), MatrixXd::Zero(observations.rows(), observations.channels())), {}};
+  LinearModel linear{
+      Components(1 + observations.shape.size(), MatrixXd::Zero(observations.rows(), observations.channels())),
+      {}};
   for (const Term& term : model.terms) {
     TermResponse response = respond(term, observations, predicted);
     for (std::size_t k = 0; k < linear.offset.size(); ++k) linear.offset[k] += response.value[k];
     for (std::size_t k = 0; k < response.derivative.size(); ++k)
       if (is_free(term, k)) linear.columns.push_back(std::move(response.derivative[k]));
   }
-  for (const Curve& curve : model.curves) linear.columns.insert(linear.columns.end(), curve.columns.begin(), curve.columns.end());
+  for (const Curve& curve : model.curves)
+    linear.columns.insert(linear.columns.end(), curve.columns.begin(), curve.columns.end());
   return linear;
 }
 
-MeanModel refit(const Observations& observations, const MeanModel& start, const NullFit& variances, const std::vector<int>& rows) {
+MeanModel refit(const Observations& observations, const MeanModel& start, const NullFit& variances,
+                const std::vector<int>& rows) {
   MeanModel model = start;
   const MixedModel mixed(observations, rows, variances.ratio);
   const Whitener whitener(mixed, variances, model.curves);
@@ -198,7 +215,8 @@ JointFit fit_jointly(const Observations& observations, const MeanModel& start, c
   JointFit fit{.model = start, .linear = {}, .variances = {}, .at_bound = {}};
   const MixedModel mixed(observations, rows);
   const Components y = response_components(observations);
-  // Variances depend on the mean and the mean on the variances: twice round is enough, since both move little.
+  // Variances depend on the mean and the mean on the variances: twice round is enough, since both move
+  // little.
   for (int round = 0; round < 2; ++round) {
     const MatrixXd predicted = predict_response(observations, fit.model, rows);
     fit.linear = linearise(observations, fit.model, predicted);

@@ -15,34 +15,38 @@ struct MeanModel {
   std::vector<Curve> curves;
 };
 
-/// A mean model at its parameters, ready for linear algebra: what the terms add, and columns for everything still free.
+/// A mean model at its parameters, ready for linear algebra: what the terms add, and columns for everything
+/// still free.
 struct LinearModel {
   Components offset;                // what the terms add to y
   std::vector<Components> columns;  // derivatives by the terms' free parameters, then the curves' columns
 };
 
 /// Force (response) that baseline and terms predict, n × c: group constants from the mean over `rows`.
-Eigen::MatrixXd predict_response(const Observations& observations, const MeanModel& model, const std::vector<int>& rows);
+Eigen::MatrixXd predict_response(const Observations& observations, const MeanModel& model,
+                                 const std::vector<int>& rows);
 
 /// y of the observations, as components.
 Components response_components(const Observations& observations);
 Components difference(const Components& a, const Components& b);
 
-LinearModel linearise(const Observations& observations, const MeanModel& model, const Eigen::MatrixXd& predicted);
+LinearModel linearise(const Observations& observations, const MeanModel& model,
+                      const Eigen::MatrixXd& predicted);
 
 struct JointFit {
   MeanModel model;
   LinearModel linear;
-  NullFit variances;           // with the model in
+  NullFit variances;                  // with the model in
   std::vector<std::string> at_bound;  // "creep time_constant"
   bool converged = true;
 };
 
-/// Weighted by the variances of the mixed model, which are fitted anew after; group constants and curves are linear and
-/// are projected out. Parameters stay within their physical bounds.
+/// Weighted by the variances of the mixed model, which are fitted anew after; group constants and curves are
+/// linear and are projected out. Parameters stay within their physical bounds.
 JointFit fit_jointly(const Observations& observations, const MeanModel& start, const std::vector<int>& rows);
 
 /// The same with known variances, from a start that is nearly there: for jackknives.
-MeanModel refit(const Observations& observations, const MeanModel& start, const NullFit& variances, const std::vector<int>& rows);
+MeanModel refit(const Observations& observations, const MeanModel& start, const NullFit& variances,
+                const std::vector<int>& rows);
 
 }  // namespace tunnelrig

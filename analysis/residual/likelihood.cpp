@@ -19,7 +19,8 @@ constexpr int kMostColumns = 24;
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostColumns, 1>;
 
-/// −log10 of the upper tail of F(k, N − k) at a likelihood ratio; tabulated, since it is asked a million times.
+/// −log10 of the upper tail of F(k, N − k) at a likelihood ratio; tabulated, since it is asked a million
+/// times.
 class EvidenceTable {
  public:
   EvidenceTable(int columns, double observations) {
@@ -33,7 +34,8 @@ class EvidenceTable {
   }
   double operator()(double ratio) const {
     const double at = ratio / kStep;
-    if (at >= kEntries - 1) return entries_[kEntries - 1] + (ratio - kStep * (kEntries - 1)) / std::numbers::ln10;
+    if (at >= kEntries - 1)
+      return entries_[kEntries - 1] + (ratio - kStep * (kEntries - 1)) / std::numbers::ln10;
     const auto i = static_cast<std::size_t>(at);
     return entries_[i] + (at - static_cast<double>(i)) * (entries_[i + 1] - entries_[i]);
   }
@@ -46,9 +48,9 @@ class EvidenceTable {
 
 /// One stratum at one ratio: products of all columns with each other.
 struct Products {
-  Stacked columns;                 // projected: adopted first, then all candidates'
-  MatrixXd adopted_adopted;        // q × q
-  MatrixXd adopted_candidate;      // q × K
+  Stacked columns;                  // projected: adopted first, then all candidates'
+  MatrixXd adopted_adopted;         // q × q
+  MatrixXd adopted_candidate;       // q × K
   std::vector<MatrixXd> candidate;  // k × k of each
 };
 
@@ -64,7 +66,7 @@ struct CandidateScan::Impl {
   const MixedModel& model;
   Index adopted = 0;
   std::vector<Candidate> candidates;
-  std::vector<Index> first;  // column of each candidate
+  std::vector<Index> first;                     // column of each candidate
   std::vector<std::vector<Products>> products;  // stratum, ratio
   std::map<std::pair<int, Index>, EvidenceTable> tables;
   std::vector<const EvidenceTable*> table_of;
@@ -82,7 +84,8 @@ struct CandidateScan::Impl {
     for (std::size_t s = 0; s < model.strata().size(); ++s) {
       const Stacked stacked = model.stack(s, items);
       products.emplace_back();
-      for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) products[s].push_back(multiply(s, ratio, stacked));
+      for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio)
+        products[s].push_back(multiply(s, ratio, stacked));
       mark_touched(s);
     }
     for (std::size_t i = 0; i < candidates.size(); ++i) table_of.push_back(table_for(i));
@@ -102,7 +105,8 @@ struct CandidateScan::Impl {
   }
 
   void mark_touched(std::size_t s) {
-    for (std::size_t i = 0; i < candidates.size(); ++i) touches[i][s] = products[s][0].candidate[i].trace() > 0;
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+      touches[i][s] = products[s][0].candidate[i].trace() > 0;
   }
 
   const EvidenceTable* table_for(std::size_t i) {
@@ -111,10 +115,12 @@ struct CandidateScan::Impl {
       if (touches[i][s]) observations += model.dof(s);
     const int columns = static_cast<int>(candidates[i].columns.size());
     observations = std::max<Index>(observations - adopted, columns + 2);
-    return &tables.try_emplace({columns, observations}, columns, static_cast<double>(observations)).first->second;
+    return &tables.try_emplace({columns, observations}, columns, static_cast<double>(observations))
+                .first->second;
   }
 
-  // --- data ---------------------------------------------------------------------------------------------------------
+  // --- data
+  // ---------------------------------------------------------------------------------------------------------
 
   using Data = std::vector<std::vector<DataProducts>>;  // stratum, ratio
 
@@ -124,13 +130,15 @@ struct CandidateScan::Impl {
       for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
         Stacked projected = data[s];
         model.project(s, ratio, projected);
-        result[s].push_back({projected.colwise().squaredNorm().transpose(), products[s][ratio].columns.transpose() * projected});
+        result[s].push_back({projected.colwise().squaredNorm().transpose(),
+                             products[s][ratio].columns.transpose() * projected});
       }
     }
     return result;
   }
 
-  // --- one data set -------------------------------------------------------------------------------------------------
+  // --- one data set
+  // -------------------------------------------------------------------------------------------------
 
   struct State {
     std::vector<std::size_t> ratio;  // of each stratum
@@ -139,9 +147,12 @@ struct CandidateScan::Impl {
     double log_likelihood = 0;
   };
 
-  /// Generalised least squares of all strata together, their variances found by two reweightings; candidate −1: none.
+  /// Generalised least squares of all strata together, their variances found by two reweightings; candidate
+  /// −1: none.
   void solve(const Data& data, Index set, int candidate, State& state) const {
-    const Index own = candidate < 0 ? 0 : static_cast<Index>(candidates[static_cast<std::size_t>(candidate)].columns.size());
+    const Index own =
+        candidate < 0 ? 0
+                      : static_cast<Index>(candidates[static_cast<std::size_t>(candidate)].columns.size());
     const Index k = adopted + own;
     const std::size_t strata = model.strata().size();
     state.rss.resize(strata);
@@ -158,7 +169,8 @@ struct CandidateScan::Impl {
       }
     }
     state.log_likelihood = 0;
-    for (std::size_t s = 0; s < strata; ++s) state.log_likelihood += stratum_likelihood(s, state.ratio[s], state.rss[s]);
+    for (std::size_t s = 0; s < strata; ++s)
+      state.log_likelihood += stratum_likelihood(s, state.ratio[s], state.rss[s]);
   }
 
   double stratum_likelihood(std::size_t s, std::size_t ratio, double rss) const {
@@ -167,7 +179,8 @@ struct CandidateScan::Impl {
   }
 
   template <class A, class B>
-  void normal_equations(const Data& data, Index set, int candidate, std::size_t s, const State& state, A& a, B& b) const {
+  void normal_equations(const Data& data, Index set, int candidate, std::size_t s, const State& state, A& a,
+                        B& b) const {
     const Products& p = products[s][state.ratio[s]];
     const auto& y = data[s][state.ratio[s]].columns;
     a.topLeftCorner(adopted, adopted) = p.adopted_adopted;
@@ -181,7 +194,8 @@ struct CandidateScan::Impl {
     b.tail(own) = y.col(set).segment(first[i], own);
   }
 
-  void accumulate(const Data& data, Index set, int candidate, std::size_t s, const State& state, SmallMatrix& a, SmallVector& b) const {
+  void accumulate(const Data& data, Index set, int candidate, std::size_t s, const State& state,
+                  SmallMatrix& a, SmallVector& b) const {
     SmallMatrix stratum_a(a.rows(), a.cols());
     SmallVector stratum_b(b.size());
     normal_equations(data, set, candidate, s, state, stratum_a, stratum_b);
@@ -195,7 +209,8 @@ struct CandidateScan::Impl {
     SmallVector b(state.amplitude.size());
     normal_equations(data, set, candidate, s, state, a, b);
     const double squares = data[s][state.ratio[s]].squares(set);
-    return std::max(squares - 2 * state.amplitude.dot(b) + state.amplitude.dot(a * state.amplitude), 1e-12 * squares);
+    return std::max(squares - 2 * state.amplitude.dot(b) + state.amplitude.dot(a * state.amplitude),
+                    1e-12 * squares);
   }
 
   /// Ratios one stratum after the other, each at its best with the others held.
@@ -232,7 +247,8 @@ struct CandidateScan::Impl {
     }
   }
 
-  CandidateFit fit_candidate(const Data& data, Index set, int candidate, const State& null, double threshold) const {
+  CandidateFit fit_candidate(const Data& data, Index set, int candidate, const State& null,
+                             double threshold) const {
     const auto i = static_cast<std::size_t>(candidate);
     CandidateFit result;
     State state = null;
@@ -243,8 +259,8 @@ struct CandidateScan::Impl {
       const bool wrong_side = own == 1 && candidates[i].sign * s.amplitude(adopted) < 0;
       return wrong_side ? 0.0 : (*table_of[i])(ratio) + std::log10(candidates[i].weight);
     };
-    // A smaller session variance can only help a candidate that varies between sessions, and rarely by much: it is
-    // tried where it may decide.
+    // A smaller session variance can only help a candidate that varies between sessions, and rarely by much:
+    // it is tried where it may decide.
     if (evidence(state) > threshold) improve(data, set, candidate, state);
     result.likelihood_ratio = std::max(0.0, state.log_likelihood - null.log_likelihood);
     result.evidence = evidence(state);
@@ -253,7 +269,8 @@ struct CandidateScan::Impl {
   }
 };
 
-CandidateScan::CandidateScan(const MixedModel& model, const std::vector<Components>& adopted, const std::vector<Candidate>& candidates)
+CandidateScan::CandidateScan(const MixedModel& model, const std::vector<Components>& adopted,
+                             const std::vector<Candidate>& candidates)
     : impl_(std::make_unique<Impl>(model, adopted, candidates)) {}
 CandidateScan::~CandidateScan() = default;
 
@@ -262,7 +279,8 @@ NullFit CandidateScan::null_fit(const Components& y) const {
   for (std::size_t s = 0; s < impl_->model.strata().size(); ++s) data.push_back(impl_->model.stack(s, {&y}));
   const Impl::Data products = impl_->multiply_data(data);
   const Impl::State state = impl_->best_without(products, 0);
-  NullFit result{.ratio = state.ratio, .sigma = {}, .ratio_probability = {}, .log_likelihood = state.log_likelihood};
+  NullFit result{
+      .ratio = state.ratio, .sigma = {}, .ratio_probability = {}, .log_likelihood = state.log_likelihood};
   for (std::size_t s = 0; s < data.size(); ++s) {
     result.sigma.push_back(std::sqrt(state.rss[s] / static_cast<double>(impl_->model.dof(s))));
     std::vector<double> probability;
@@ -291,11 +309,13 @@ std::vector<CandidateFit> CandidateScan::fit(const Components& y) const {
   return result;
 }
 
-std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::size_t count, std::mt19937_64& random) const {
+std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::size_t count,
+                                                    std::mt19937_64& random) const {
   std::vector<Stacked> data;
   for (std::size_t s = 0; s < impl_->model.strata().size(); ++s) {
     // The session variance is not known better than its likelihood says: each data set draws its own.
-    std::discrete_distribution<std::size_t> draw(null.ratio_probability[s].begin(), null.ratio_probability[s].end());
+    std::discrete_distribution<std::size_t> draw(null.ratio_probability[s].begin(),
+                                                 null.ratio_probability[s].end());
     std::vector<std::size_t> ratio(count);
     for (std::size_t& r : ratio) r = draw(random);
     data.push_back(impl_->model.simulate(s, std::vector<double>(count, null.sigma[s]), ratio, random));
@@ -306,9 +326,13 @@ std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::si
     for (std::size_t set = begin; set < count; set += step) {
       const Impl::State state = impl_->best_without(products, static_cast<Index>(set));
       for (std::size_t i = 0; i < impl_->candidates.size(); ++i) {
-        // Within a factor of a hundred of the largest so far, a better variance may still make it the largest.
+        // Within a factor of a hundred of the largest so far, a better variance may still make it the
+        // largest.
         const double threshold = std::max(0.5, maxima[set] - 2);
-        maxima[set] = std::max(maxima[set], impl_->fit_candidate(products, static_cast<Index>(set), static_cast<int>(i), state, threshold).evidence);
+        maxima[set] = std::max(
+            maxima[set],
+            impl_->fit_candidate(products, static_cast<Index>(set), static_cast<int>(i), state, threshold)
+                .evidence);
       }
     }
   };

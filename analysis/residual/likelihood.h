@@ -1,4 +1,5 @@
-// Likelihood ratios of many candidates on many data sets at once: the measured one, and those simulated without effect.
+// Likelihood ratios of many candidates on many data sets at once: the measured one, and those simulated
+// without effect.
 #pragma once
 
 #include "analysis/residual/mixed_model.h"
@@ -11,14 +12,14 @@ namespace tunnelrig {
 /// A candidate's columns: one for a term (its amplitude), several for a curve.
 struct Candidate {
   std::vector<Components> columns;
-  int sign = 0;         // of an amplitude that physics bounds to one side: +1 or −1; 0: free
-  double weight = 1;    // prior weight in the maximum (Genovese, Roeder & Wasserman 2006)
+  int sign = 0;       // of an amplitude that physics bounds to one side: +1 or −1; 0: free
+  double weight = 1;  // prior weight in the maximum (Genovese, Roeder & Wasserman 2006)
 };
 
 /// How well the model without candidates fits one data set.
 struct NullFit {
-  std::vector<std::size_t> ratio;  // of each stratum, index in kRatios
-  std::vector<double> sigma;       // run scatter of each stratum, in y
+  std::vector<std::size_t> ratio;                      // of each stratum, index in kRatios
+  std::vector<double> sigma;                           // run scatter of each stratum, in y
   std::vector<std::vector<double>> ratio_probability;  // likelihood of each ratio, normalised
   double log_likelihood = 0;
 };
@@ -30,10 +31,12 @@ struct CandidateFit {
   Eigen::VectorXd amplitude;
 };
 
-/// Statistic of all candidates with `adopted` columns already in the model, all variances fitted anew for each.
+/// Statistic of all candidates with `adopted` columns already in the model, all variances fitted anew for
+/// each.
 class CandidateScan {
  public:
-  CandidateScan(const MixedModel& model, const std::vector<Components>& adopted, const std::vector<Candidate>& candidates);
+  CandidateScan(const MixedModel& model, const std::vector<Components>& adopted,
+                const std::vector<Candidate>& candidates);
   ~CandidateScan();
 
   NullFit null_fit(const Components& y) const;

@@ -24,17 +24,22 @@ MatrixXd orthonormal_modes(Index channels) {
 
 }  // namespace
 
-MixedModel::MixedModel(const Observations& observations, std::vector<int> rows, const std::vector<std::size_t>& ratio)
-    : observations_(observations), rows_(std::move(rows)), modes_(orthonormal_modes(observations.channels())) {
+MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
+                       const std::vector<std::size_t>& ratio)
+    : observations_(observations),
+      rows_(std::move(rows)),
+      modes_(orthonormal_modes(observations.channels())) {
   if (modes_(0, 0) < 0) modes_ *= -1;
   for (std::size_t component = 0; component <= observations.shape.size(); ++component) {
     strata_.push_back({component, 0, 1});
-    if (observations.channels() > 1) strata_.push_back({component, 1, static_cast<int>(observations.channels()) - 1});
+    if (observations.channels() > 1)
+      strata_.push_back({component, 1, static_cast<int>(observations.channels()) - 1});
   }
   std::map<int, std::vector<Index>> blocks;
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     blocks[observations.block[static_cast<std::size_t>(rows_[r])]].push_back(static_cast<Index>(r));
-    groups_.emplace(observations.group[static_cast<std::size_t>(rows_[r])], static_cast<Index>(groups_.size()));
+    groups_.emplace(observations.group[static_cast<std::size_t>(rows_[r])],
+                    static_cast<Index>(groups_.size()));
   }
   if (observations.blocks_are_rows) ratios_ = 1;
   for (auto& [block, runs] : blocks) blocks_.push_back(std::move(runs));
@@ -44,7 +49,8 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows, 
 }
 
 MatrixXd MixedModel::baseline_of(const std::vector<int>& rows) const {
-  MatrixXd baseline = MatrixXd::Zero(static_cast<Index>(rows.size()), static_cast<Index>(groups_.size()) + observations_.slopes.cols());
+  MatrixXd baseline = MatrixXd::Zero(static_cast<Index>(rows.size()),
+                                     static_cast<Index>(groups_.size()) + observations_.slopes.cols());
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const auto row = static_cast<Index>(r);
     const auto group = groups_.find(observations_.group[static_cast<std::size_t>(rows[r])]);
@@ -100,7 +106,8 @@ Stacked MixedModel::stack(std::size_t stratum, const std::vector<const Component
   Stacked result(n * s.modes, static_cast<Index>(items.size()));
   for (std::size_t i = 0; i < items.size(); ++i) {
     const MatrixXd picked = (*items[i])[s.component](rows_, Eigen::all);
-    Eigen::Map<MatrixXd>(result.col(static_cast<Index>(i)).data(), n, s.modes) = picked * modes_.middleCols(s.first_mode, s.modes);
+    Eigen::Map<MatrixXd>(result.col(static_cast<Index>(i)).data(), n, s.modes) =
+        picked * modes_.middleCols(s.first_mode, s.modes);
   }
   return result;
 }
@@ -115,29 +122,33 @@ void MixedModel::project(std::size_t stratum, std::size_t ratio, Stacked& column
   }
 }
 
-Stacked MixedModel::baseline_prediction(std::size_t stratum, std::size_t ratio, const Stacked& columns, const std::vector<int>& rows) const {
+Stacked MixedModel::baseline_prediction(std::size_t stratum, std::size_t ratio, const Stacked& columns,
+                                        const std::vector<int>& rows) const {
   const Index n = static_cast<Index>(rows_.size()), wanted = static_cast<Index>(rows.size());
   const Index modes = strata_[stratum].modes;
   Stacked result = Stacked::Zero(wanted * modes, columns.cols());
   if (!strata_[stratum].means()) return result;
   MatrixXd by_mode = Eigen::Map<const MatrixXd>(columns.data(), n, modes * columns.cols());
   whiten(ratio, by_mode);
-  Eigen::Map<MatrixXd>(result.data(), wanted, modes * columns.cols()) = baseline_of(rows) * prepared_[ratio].qr.solve(by_mode);
+  Eigen::Map<MatrixXd>(result.data(), wanted, modes * columns.cols()) =
+      baseline_of(rows) * prepared_[ratio].qr.solve(by_mode);
   return result;
 }
 
-Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t ratio, const std::vector<int>& rows) const {
+Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t ratio,
+                                              const std::vector<int>& rows) const {
   if (!strata_[stratum].means()) return Eigen::VectorXd::Zero(static_cast<Index>(rows.size()));
   const Prepared& p = prepared_[ratio];
   // L_row (LᵀV⁻¹L)⁻¹ L_rowᵀ with LᵀV⁻¹L = P RᵀR Pᵀ
-  const MatrixXd r = p.qr.matrixQR().topLeftCorner(baseline_columns_, baseline_columns_).triangularView<Eigen::Upper>();
+  const MatrixXd r =
+      p.qr.matrixQR().topLeftCorner(baseline_columns_, baseline_columns_).triangularView<Eigen::Upper>();
   const MatrixXd permuted = (baseline_of(rows) * p.qr.colsPermutation()).leftCols(baseline_columns_);
   const MatrixXd half = r.transpose().triangularView<Eigen::Lower>().solve(permuted.transpose());
   return half.colwise().squaredNorm().transpose();
 }
 
-Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sigma, const std::vector<std::size_t>& ratio,
-                             std::mt19937_64& random) const {
+Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sigma,
+                             const std::vector<std::size_t>& ratio, std::mt19937_64& random) const {
   std::normal_distribution<double> normal;
   const Index n = static_cast<Index>(rows_.size());
   Stacked result(n * strata_[stratum].modes, static_cast<Index>(sigma.size()));

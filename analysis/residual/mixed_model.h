@@ -2,9 +2,9 @@
 //
 //   y = (group's constant, free per rotor) + terms + session + run
 //
-// The rotors' y are rotated into one common and c − 1 difference modes; the runs' means and each cosine coefficient of
-// their course, common or difference, make a stratum with a run variance σ² and a session variance a σ² of its own.
-// docs/closed-loop.md has the equations.
+// The rotors' y are rotated into one common and c − 1 difference modes; the runs' means and each cosine
+// coefficient of their course, common or difference, make a stratum with a run variance σ² and a session
+// variance a σ² of its own. docs/closed-loop.md has the equations.
 #pragma once
 
 #include "analysis/residual/terms.h"
@@ -35,13 +35,15 @@ class MixedModel {
   };
 
   /// `ratio`: only these ratios are prepared (of each stratum); empty: all.
-  MixedModel(const Observations& observations, std::vector<int> rows, const std::vector<std::size_t>& ratio = {});
+  MixedModel(const Observations& observations, std::vector<int> rows,
+             const std::vector<std::size_t>& ratio = {});
 
   const std::vector<int>& rows() const { return rows_; }
   const std::vector<Stratum>& strata() const { return strata_; }
-  Eigen::Index dof(std::size_t stratum) const;                         // runs · modes less the baseline's
-  double log_determinant(std::size_t stratum, std::size_t ratio) const;  // restricted likelihood's constant, ½ log(…)
-  std::size_t ratios() const { return ratios_; }                       // 1 where blocks are single rows
+  Eigen::Index dof(std::size_t stratum) const;  // runs · modes less the baseline's
+  double log_determinant(std::size_t stratum,
+                         std::size_t ratio) const;  // restricted likelihood's constant, ½ log(…)
+  std::size_t ratios() const { return ratios_; }    // 1 where blocks are single rows
 
   /// Picks the model's runs and rotates the rotors into modes; one item per column of the result.
   Stacked stack(std::size_t stratum, const std::vector<const Components*>& items) const;
@@ -49,16 +51,20 @@ class MixedModel {
   /// Whitens with the ratio and takes out what the baseline can absorb, in place.
   void project(std::size_t stratum, std::size_t ratio, Stacked& columns) const;
 
-  /// What the baseline, fitted to stacked columns of the model's runs, predicts for other runs (stacked likewise, not
-  /// whitened). Rows whose group the model does not hold are NaN. Courses have no baseline: zero.
-  Stacked baseline_prediction(std::size_t stratum, std::size_t ratio, const Stacked& columns, const std::vector<int>& rows) const;
+  /// What the baseline, fitted to stacked columns of the model's runs, predicts for other runs (stacked
+  /// likewise, not whitened). Rows whose group the model does not hold are NaN. Courses have no baseline:
+  /// zero.
+  Stacked baseline_prediction(std::size_t stratum, std::size_t ratio, const Stacked& columns,
+                              const std::vector<int>& rows) const;
 
   /// Variance of that prediction's baseline part over σ², one per run (NaN likewise).
-  Eigen::VectorXd baseline_variance(std::size_t stratum, std::size_t ratio, const std::vector<int>& rows) const;
+  Eigen::VectorXd baseline_variance(std::size_t stratum, std::size_t ratio,
+                                    const std::vector<int>& rows) const;
 
-  /// Draws data without any effect: session and run scatter of the given σ and ratio. Stacked, `count` columns.
-  Stacked simulate(std::size_t stratum, const std::vector<double>& sigma, const std::vector<std::size_t>& ratio,
-                   std::mt19937_64& random) const;
+  /// Draws data without any effect: session and run scatter of the given σ and ratio. Stacked, `count`
+  /// columns.
+  Stacked simulate(std::size_t stratum, const std::vector<double>& sigma,
+                   const std::vector<std::size_t>& ratio, std::mt19937_64& random) const;
 
   /// Orthonormal, c × c; the first column is the mean's.
   const Eigen::MatrixXd& mode_matrix() const { return modes_; }

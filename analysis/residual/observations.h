@@ -1,4 +1,5 @@
-// What the model is held against: one response per run and rotor, what is known of each run, and how runs belong together.
+// What the model is held against: one response per run and rotor, what is known of each run, and how runs
+// belong together.
 #pragma once
 
 #include "analysis/campaign_data.h"
@@ -12,7 +13,8 @@
 
 namespace tunnelrig {
 
-/// A condition of every run: a column of the runs sheet, or one derived from it. NaN where it was not recorded.
+/// A condition of every run: a column of the runs sheet, or one derived from it. NaN where it was not
+/// recorded.
 struct Covariate {
   std::string name;
   Eigen::MatrixXd value;  // runs × 1, or runs × channels where each channel has its own
@@ -24,27 +26,31 @@ struct Covariate {
 
 /// n runs (rows of a table) by c channels (rotors; 1 for a table).
 ///
-/// Where the response has one sign the model is multiplicative: `y` is the logarithm of the response over what the
-/// baseline takes as known (k_i ½ρΩ²R²A), and errors are relative. Otherwise it is additive: `y` is the response.
+/// Where the response has one sign the model is multiplicative: `y` is the logarithm of the response over
+/// what the baseline takes as known (k_i ½ρΩ²R²A), and errors are relative. Otherwise it is additive: `y` is
+/// the response.
 struct Observations {
   std::string campaign, response, unit, baseline;
   bool multiplicative = true;
   Eigen::MatrixXd value;  // n × c, in the unit
   Eigen::MatrixXd known;  // n × c: the baseline's known factor; 1 where there is none
   Eigen::MatrixXd y;      // n × c
-  std::vector<Eigen::MatrixXd> shape;  // J matrices n × c: cosine coefficients of the run's course; empty without raw data
-  Eigen::VectorXd duration_s;          // 0 where there is no raw data
+  std::vector<Eigen::MatrixXd>
+      shape;  // J matrices n × c: cosine coefficients of the run's course; empty without raw data
+  Eigen::VectorXd duration_s;  // 0 where there is no raw data
 
   std::vector<std::string> name;  // of each run, or "file:line" of a row
-  std::vector<int> group, block;  // baseline group (location) and block (session), from 0; blocks in order of time
+  std::vector<int> group,
+      block;  // baseline group (location) and block (session), from 0; blocks in order of time
   std::vector<std::string> group_name, block_name;
   Eigen::MatrixXd slopes;  // n × s: baseline columns beside the groups' constants
   std::vector<std::string> slope_name;
   std::vector<bool> in_tunnel;
-  std::vector<int> previous;  // the run before in the same session, −1 for the first
+  std::vector<int> previous;   // the run before in the same session, −1 for the first
   std::vector<bool> held_out;  // a table's hold_out expression; empty: seal blocks instead
   bool blocks_are_rows = false;
-  bool groups_within_blocks = false;  // the block is the group: its baseline is estimated anew where it is held out
+  bool groups_within_blocks =
+      false;  // the block is the group: its baseline is estimated anew where it is held out
 
   Eigen::VectorXd newtons_per_volt;  // c
   Rig rig;
@@ -65,14 +71,16 @@ struct Observations {
 
 struct ObservationChoice {
   std::string response;  // "thrust", "c_t", "cell", or a column; empty: the table's response, or thrust
-  std::string baseline;  // "thesis", "open_space"; tables: "constant", "linear:COLUMN", "power:COLUMN"; empty: default
+  std::string baseline;  // "thesis", "open_space"; tables: "constant", "linear:COLUMN", "power:COLUMN";
+                         // empty: default
 };
 
 /// Cosine coefficients kept of a run's course: cos(π j (t/duration)), j = 1 … kShapes.
 inline constexpr int kShapes = 6;
 
-/// All thrust runs that can be reduced, with the thesis's model. Windows of the runs are used where `data` has them.
-/// Throws InputError for a response or baseline that the campaign does not have, or a response without variation.
+/// All thrust runs that can be reduced, with the thesis's model. Windows of the runs are used where `data`
+/// has them. Throws InputError for a response or baseline that the campaign does not have, or a response
+/// without variation.
 Observations observe_campaign(const CampaignData& data, const ObservationChoice& choice);
 
 /// All rows. Throws InputError likewise.

@@ -1,6 +1,6 @@
+#include "analysis/conventions.h"
 #include "analysis/reduction.h"
 #include "analysis/residual/observations.h"
-#include "analysis/conventions.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -23,7 +23,9 @@ struct Source {
   std::vector<std::size_t> order;  // of reduction.runs, by time
 
   Index rows() const { return static_cast<Index>(order.size()); }
-  const RunCoefficients& coefficients(Index row) const { return reduction.runs[order[static_cast<std::size_t>(row)]]; }
+  const RunCoefficients& coefficients(Index row) const {
+    return reduction.runs[order[static_cast<std::size_t>(row)]];
+  }
   const Run& run(Index row) const { return data.runs[coefficients(row).run]; }
   const RunStatistics* statistics(Index row) const {
     const auto found = data.statistics.find(run(row).run);
@@ -32,13 +34,15 @@ struct Source {
 };
 
 /// cos(π j (w + ½)/W) coefficients of a run's windows, over the run's mean force.
-void set_course(const RunStatistics& statistics, Index row, Index channel, double newtons_per_volt, double mean_N,
-                std::vector<MatrixXd>& shape) {
+void set_course(const RunStatistics& statistics, Index row, Index channel, double newtons_per_volt,
+                double mean_N, std::vector<MatrixXd>& shape) {
   const std::size_t channels = statistics.channels.size();
   const std::size_t windows = statistics.window_means_V.size() / channels;
   double sum = 0;
   std::size_t present = 0;
-  const auto at = [&](std::size_t w) { return statistics.window_means_V[w * channels + static_cast<std::size_t>(channel)]; };
+  const auto at = [&](std::size_t w) {
+    return statistics.window_means_V[w * channels + static_cast<std::size_t>(channel)];
+  };
   for (std::size_t w = 0; w < windows; ++w) {
     if (std::isnan(at(w))) continue;
     sum += at(w);
@@ -60,7 +64,9 @@ void set_course(const RunStatistics& statistics, Index row, Index channel, doubl
 void add_courses(const Source& source, Observations& result) {
   for (Index row = 0; row < source.rows(); ++row) {
     const RunStatistics* statistics = source.statistics(row);
-    if (statistics == nullptr || statistics->window_means_V.size() < 2 * kShapes * statistics->channels.size()) return;
+    if (statistics == nullptr ||
+        statistics->window_means_V.size() < 2 * kShapes * statistics->channels.size())
+      return;
   }
   result.shape.assign(kShapes, MatrixXd::Zero(source.rows(), result.channels()));
   for (Index row = 0; row < source.rows(); ++row) {
@@ -100,7 +106,8 @@ void add_raw_covariates(const Source& source, Observations& result) {
     Covariate covariate{name, MatrixXd::Zero(source.rows(), result.channels()), true};
     for (Index row = 0; row < source.rows(); ++row)
       for (Index c = 0; c < result.channels(); ++c)
-        covariate.value(row, c) = value_of(*source.statistics(row), source.statistics(row)->channels[static_cast<std::size_t>(c)]);
+        covariate.value(row, c) =
+            value_of(*source.statistics(row), source.statistics(row)->channels[static_cast<std::size_t>(c)]);
     result.covariates.push_back(std::move(covariate));
   };
   const auto lines = [](const auto& chosen) {
@@ -116,7 +123,8 @@ void add_raw_covariates(const Source& source, Observations& result) {
   });
   add("mains_amplitude_V", lines([](std::string_view name) { return name.starts_with("mains"); }));
   add("alias_amplitude_V", lines([](std::string_view name) { return name.find("alias") != name.npos; }));
-  add("vibration_amplitude_V", lines([](std::string_view name) { return name == "shaft" || name == "blade_pass"; }));
+  add("vibration_amplitude_V",
+      lines([](std::string_view name) { return name == "shaft" || name == "blade_pass"; }));
 }
 
 /// Hours since the session's first run, the run's number, and the trend of the air's temperature.
@@ -131,7 +139,9 @@ void add_derived_covariates(const Source& source, Observations& result) {
   }
   Covariate hours{"hours_in_session", MatrixXd(n, 1), true}, order{"run_order", MatrixXd(n, 1), true};
   for (Index row = 0; row < n; ++row) {
-    hours.value(row, 0) = (source.run(row).start_s - first[static_cast<std::size_t>(result.block[static_cast<std::size_t>(row)])]) / 3600;
+    hours.value(row, 0) = (source.run(row).start_s -
+                           first[static_cast<std::size_t>(result.block[static_cast<std::size_t>(row)])]) /
+                          3600;
     order.value(row, 0) = static_cast<double>(row);
   }
   result.covariates.push_back(hours);
@@ -141,8 +151,12 @@ void add_derived_covariates(const Source& source, Observations& result) {
   Covariate trend{"air_temperature_rate_K_s", MatrixXd::Zero(n, 1), true};
   for (Index row = 0; row < n; ++row) {
     Index low = row, high = row;
-    if (row > 0 && result.block[static_cast<std::size_t>(row - 1)] == result.block[static_cast<std::size_t>(row)]) low = row - 1;
-    if (row + 1 < n && result.block[static_cast<std::size_t>(row + 1)] == result.block[static_cast<std::size_t>(row)]) high = row + 1;
+    if (row > 0 &&
+        result.block[static_cast<std::size_t>(row - 1)] == result.block[static_cast<std::size_t>(row)])
+      low = row - 1;
+    if (row + 1 < n &&
+        result.block[static_cast<std::size_t>(row + 1)] == result.block[static_cast<std::size_t>(row)])
+      high = row + 1;
     const double seconds = source.run(high).start_s - source.run(low).start_s;
     if (seconds > 0) trend.value(row, 0) = (air->value(high, 0) - air->value(low, 0)) / seconds;
   }
@@ -151,8 +165,9 @@ void add_derived_covariates(const Source& source, Observations& result) {
 
 /// Open space has one coefficient for all heights where the baseline says so.
 std::string group_of(const Run& run, const std::string& baseline) {
-  const bool open = run.location == "OS" || run.location.starts_with("GND") || run.location.starts_with("CEIL") ||
-                    run.number("ground_distance_R") || run.number("ceiling_distance_R");
+  const bool open = run.location == "OS" || run.location.starts_with("GND") ||
+                    run.location.starts_with("CEIL") || run.number("ground_distance_R") ||
+                    run.number("ceiling_distance_R");
   return baseline == "open_space" && open ? "open space" : run.location;
 }
 
@@ -195,14 +210,18 @@ Response response_of(const Source& source, const std::string& name, const Eigen:
   if (name == "thrust")
     return {rig.rotors, "N", thrust_N, [=](Index row, Index) { return reference_N(row); }};
   if (name == "cell") {
-    return {rig.rotors, "V", [=](Index row, Index channel) { return thrust_N(row, channel) / newtons_per_volt(channel); },
+    return {rig.rotors, "V",
+            [=](Index row, Index channel) { return thrust_N(row, channel) / newtons_per_volt(channel); },
             [=](Index row, Index channel) { return reference_N(row) / newtons_per_volt(channel); }};
   }
   if (name == "c_t")
-    return {1, "1", [&source](Index row, Index) { return source.coefficients(row).c_t; }, [](Index, Index) { return 1.0; }};
-  return {1, "", [&source, name](Index row, Index) {
+    return {1, "1", [&source](Index row, Index) { return source.coefficients(row).c_t; },
+            [](Index, Index) { return 1.0; }};
+  return {1, "",
+          [&source, name](Index row, Index) {
             if (const auto value = source.run(row).number(name)) return *value;
-            throw InputError::at("runs.csv", source.run(row).line, "run {} has no {}, which is the response", source.run(row).run, name);
+            throw InputError::at("runs.csv", source.run(row).line, "run {} has no {}, which is the response",
+                                 source.run(row).run, name);
           },
           [](Index, Index) { return 1.0; }};
 }
@@ -217,9 +236,11 @@ void set_response(const Source& source, const Response& response, Observations& 
       result.known(row, c) = response.known(row, c);
     }
   if (!(result.value.maxCoeff() > result.value.minCoeff()))
-    throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain", result.response));
+    throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain",
+                                 result.response));
   result.multiplicative = result.value.minCoeff() > 0;
-  result.y = result.multiplicative ? MatrixXd((result.value.array() / result.known.array()).log()) : result.value;
+  result.y =
+      result.multiplicative ? MatrixXd((result.value.array() / result.known.array()).log()) : result.value;
 }
 
 }  // namespace

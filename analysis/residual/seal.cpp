@@ -16,7 +16,8 @@ std::set<int> orphans(const Observations& observations, const std::set<int>& sea
     if (!sealed.contains(observations.block[row])) open.insert(observations.group[row]);
   }
   std::set<int> result;
-  std::set_difference(groups.begin(), groups.end(), open.begin(), open.end(), std::inserter(result, result.end()));
+  std::set_difference(groups.begin(), groups.end(), open.begin(), open.end(),
+                      std::inserter(result, result.end()));
   return result;
 }
 
@@ -36,7 +37,9 @@ std::set<int> choose(const Observations& observations, std::uint64_t seed) {
       return observations.groups_within_blocks ? 0 : orphans(observations, tried).size();
     };
     const bool many = observations.blocks() > 100;  // rows as blocks: a group has others
-    sealed.insert(many ? neighbours[0] : *std::min_element(neighbours.begin(), neighbours.end(), [&](int a, int b) { return lost(a) < lost(b); }));
+    sealed.insert(many ? neighbours[0]
+                       : *std::min_element(neighbours.begin(), neighbours.end(),
+                                           [&](int a, int b) { return lost(a) < lost(b); }));
   }
   return sealed;
 }
@@ -54,7 +57,8 @@ Seal seal_blocks(const Observations& observations, std::uint64_t seed) {
     (sealed ? sealed_groups : open_groups).insert(observations.group[row]);
   }
   for (const int group : sealed_groups)
-    if (!open_groups.contains(group)) seal.only_sealed.push_back(observations.group_name[static_cast<std::size_t>(group)]);
+    if (!open_groups.contains(group))
+      seal.only_sealed.push_back(observations.group_name[static_cast<std::size_t>(group)]);
   return seal;
 }
 

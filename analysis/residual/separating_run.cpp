@@ -37,22 +37,28 @@ std::pair<double, double> reach(const Covariate& covariate) {
   return {least, most};
 }
 
-std::vector<const Covariate*> conditions_of(const Observations& observations, const Term& first, const Term& second) {
+std::vector<const Covariate*> conditions_of(const Observations& observations, const Term& first,
+                                            const Term& second) {
   std::set<std::string> names;
-  for (const Term* term : {&first, &second}) names.insert(term->effect->covariates.begin(), term->effect->covariates.end());
+  for (const Term* term : {&first, &second})
+    names.insert(term->effect->covariates.begin(), term->effect->covariates.end());
   std::vector<const Covariate*> result;
   for (const std::string& name : names)
-    if (const Covariate* covariate = observations.find(name); covariate != nullptr && name != "run_order") result.push_back(covariate);
+    if (const Covariate* covariate = observations.find(name); covariate != nullptr && name != "run_order")
+      result.push_back(covariate);
   return result;
 }
 
-/// Every combination of low, median and high of the conditions that the two effects depend on, at a run of each group
-/// that differs in the sign of what came before it.
-std::vector<Setting> reachable(const Observations& observations, const std::vector<const Covariate*>& conditions, const std::vector<int>& rows) {
+/// Every combination of low, median and high of the conditions that the two effects depend on, at a run of
+/// each group that differs in the sign of what came before it.
+std::vector<Setting> reachable(const Observations& observations,
+                               const std::vector<const Covariate*>& conditions,
+                               const std::vector<int>& rows) {
   std::vector<Setting> settings;
   std::set<int> groups;
   for (const int row : rows)
-    if (groups.insert(observations.group[static_cast<std::size_t>(row)]).second) settings.push_back({{}, row});
+    if (groups.insert(observations.group[static_cast<std::size_t>(row)]).second)
+      settings.push_back({{}, row});
   for (const Covariate* condition : conditions) {
     const auto [least, most] = reach(*condition);
     const double middle = median(condition->value.col(0));
@@ -97,16 +103,19 @@ Observations imagined(const Observations& observations, const std::vector<Settin
 }
 
 /// What a term adds, less what the group's constant would take of it.
-MatrixXd beyond_the_constant(const Observations& observations, const Observations& at, const Term& term, const MatrixXd& predicted,
-                             const MatrixXd& predicted_at, const std::vector<int>& rows) {
-  // The settings' medians differ from the campaign's: the reference is the campaign's, which a constant makes good.
+MatrixXd beyond_the_constant(const Observations& observations, const Observations& at, const Term& term,
+                             const MatrixXd& predicted, const MatrixXd& predicted_at,
+                             const std::vector<int>& rows) {
+  // The settings' medians differ from the campaign's: the reference is the campaign's, which a constant makes
+  // good.
   const MatrixXd seen = respond(term, observations, predicted).value[0];
   MatrixXd result = respond(term, at, predicted_at).value[0];
   for (Index s = 0; s < result.rows(); ++s) {
     Eigen::RowVectorXd mean = Eigen::RowVectorXd::Zero(result.cols());
     double count = 0;
     for (const int row : rows) {
-      if (observations.group[static_cast<std::size_t>(row)] != at.group[static_cast<std::size_t>(s)]) continue;
+      if (observations.group[static_cast<std::size_t>(row)] != at.group[static_cast<std::size_t>(s)])
+        continue;
       mean += seen.row(row);
       ++count;
     }
@@ -123,7 +132,8 @@ std::string in_words(const Setting& setting, const std::string& location, double
 
 }  // namespace
 
-std::optional<SeparatingRun> separating_run(const Observations& observations, const Term& first, const Term& second, const JointFit& fit,
+std::optional<SeparatingRun> separating_run(const Observations& observations, const Term& first,
+                                            const Term& second, const JointFit& fit,
                                             const std::vector<int>& rows) {
   const std::vector<const Covariate*> conditions = conditions_of(observations, first, second);
   if (conditions.empty() || conditions.size() > 5) return {};
@@ -145,7 +155,8 @@ std::optional<SeparatingRun> separating_run(const Observations& observations, co
       const MixedModel::Stratum& stratum = mixed.strata()[k];
       if (!stratum.means()) continue;
       const double variance = std::pow(fit.variances.sigma[k], 2) * (1 + kRatios[fit.variances.ratio[k]]);
-      distance2 += by_mode.row(s).segment(stratum.first_mode, stratum.modes).squaredNorm() / std::max(variance, 1e-300);
+      distance2 += by_mode.row(s).segment(stratum.first_mode, stratum.modes).squaredNorm() /
+                   std::max(variance, 1e-300);
     }
     if (!std::isfinite(distance2) || std::sqrt(distance2) <= best.expected_sigma) continue;
     best.expected_sigma = std::sqrt(distance2);
@@ -153,7 +164,8 @@ std::optional<SeparatingRun> separating_run(const Observations& observations, co
   }
   if (!(best.expected_sigma > 0)) return {};
   best.setting = settings[chosen].covariates;
-  best.location = observations.group_name[static_cast<std::size_t>(observations.group[static_cast<std::size_t>(settings[chosen].row)])];
+  best.location = observations.group_name[static_cast<std::size_t>(
+      observations.group[static_cast<std::size_t>(settings[chosen].row)])];
   best.text = in_words(settings[chosen], best.location, best.expected_sigma);
   return best;
 }

@@ -40,12 +40,16 @@ const MatrixXd& cosines() {
 class Evaluation {
  public:
   Evaluation(const Term& term, const Observations& observations, const MatrixXd& predicted)
-      : term_(term), observations_(observations), predicted_(predicted), reference_(reference_of(*term.effect, observations)) {
+      : term_(term),
+        observations_(observations),
+        predicted_(predicted),
+        reference_(reference_of(*term.effect, observations)) {
     for (const std::string& name : term.effect->covariates) covariates_.push_back(observations.find(name));
     x_.resize(covariates_.size());
     for (std::size_t k = 0; k < term.parameters.size(); ++k) {
       parameters_[k] = EffectJet(term.parameters[k]);
-      if (term.effect->parameters[k].role != ParameterRole::kChangePoint) parameters_[k].v[static_cast<Index>(k)] = 1;
+      if (term.effect->parameters[k].role != ParameterRole::kChangePoint)
+        parameters_[k].v[static_cast<Index>(k)] = 1;
     }
     within_ = term.effect->within_time() && !observations.shape.empty();
   }
@@ -82,7 +86,8 @@ class Evaluation {
             .reference = reference_,
             .previous_N = before < 0 ? std::numeric_limits<double>::quiet_NaN() : predicted_(before, channel),
             .other_N = term_.other < 0 ? 0 : predicted_(row, term_.other),
-            .newtons_per_volt = channel < observations_.newtons_per_volt.size() ? observations_.newtons_per_volt(channel) : 1,
+            .newtons_per_volt =
+                channel < observations_.newtons_per_volt.size() ? observations_.newtons_per_volt(channel) : 1,
             .rig = &observations_.rig};
   }
 
@@ -92,10 +97,12 @@ class Evaluation {
     return observations_.multiplicative ? log(changed / force) : changed - force;
   }
 
-  static void put(Index row, Index channel, std::size_t component, const EffectJet& change, double weight, TermResponse& response) {
+  static void put(Index row, Index channel, std::size_t component, const EffectJet& change, double weight,
+                  TermResponse& response) {
     response.value[component](row, channel) += weight * change.a;
     for (std::size_t k = 0; k < response.derivative.size(); ++k)
-      if (!response.derivative[k].empty()) response.derivative[k][component](row, channel) += weight * change.v[static_cast<Index>(k)];
+      if (!response.derivative[k].empty())
+        response.derivative[k][component](row, channel) += weight * change.v[static_cast<Index>(k)];
   }
 
   const Term& term_;
@@ -108,7 +115,8 @@ class Evaluation {
   bool within_ = false;
 };
 
-/// Run numbers at which a change-point leaves enough blocks of `rows` on both sides: the first run of each block.
+/// Run numbers at which a change-point leaves enough blocks of `rows` on both sides: the first run of each
+/// block.
 std::vector<double> change_points(const Observations& observations, const std::vector<int>& rows) {
   std::vector<int> blocks;
   std::vector<double> first;
@@ -174,16 +182,21 @@ Testability testability(const Effect& effect, const Observations& observations) 
     if (const auto why = observations.not_usable.find(name); why != observations.not_usable.end())
       result.reason = name + " is " + why->second;
   }
-  if (effect.scope == EffectScope::kPair && observations.channels() < 2) result.reason = "the response has one channel";
-  if (effect.tunnel_only && std::none_of(observations.in_tunnel.begin(), observations.in_tunnel.end(), [](bool in) { return in; }))
+  if (effect.scope == EffectScope::kPair && observations.channels() < 2)
+    result.reason = "the response has one channel";
+  if (effect.tunnel_only &&
+      std::none_of(observations.in_tunnel.begin(), observations.in_tunnel.end(), [](bool in) { return in; }))
     result.reason = "no run stands in a tunnel";
-  if (effect.name == "bidirectional" && observations.multiplicative) result.reason = "the response has one sign";
+  if (effect.name == "bidirectional" && observations.multiplicative)
+    result.reason = "the response has one sign";
   if (effect.needs_previous && observations.blocks_are_rows) result.reason = "the rows have no order";
   return result;
 }
 
-std::vector<Term> ways_to_try(const Effect& effect, const Observations& observations, const std::vector<int>& rows) {
-  std::vector<Term> ways = {{.effect = &effect, .parameters = std::vector<double>(effect.parameters.size(), 0.0)}};
+std::vector<Term> ways_to_try(const Effect& effect, const Observations& observations,
+                              const std::vector<int>& rows) {
+  std::vector<Term> ways = {
+      {.effect = &effect, .parameters = std::vector<double>(effect.parameters.size(), 0.0)}};
   const int channels = static_cast<int>(observations.channels());
   if (effect.scope == EffectScope::kRotor && channels > 1) {
     for (int rotor = 0; rotor < channels; ++rotor) {

@@ -12,10 +12,10 @@ namespace tunnelrig {
 /// An effect on all rotors or on one, with its shape parameters set.
 struct Term {
   const Effect* effect = nullptr;
-  int rotor = -1;          // from 0; −1: all alike
-  int other = -1;          // crosstalk: the rotor that leaks in
-  bool per_group = false;  // its amplitude is each group's own (tables)
-  bool at_theory = false;  // its amplitude is known physics, not fitted
+  int rotor = -1;                  // from 0; −1: all alike
+  int other = -1;                  // crosstalk: the rotor that leaks in
+  bool per_group = false;          // its amplitude is each group's own (tables)
+  bool at_theory = false;          // its amplitude is known physics, not fitted
   std::vector<double> parameters;  // all of the effect's; the amplitude is 0 until it was fitted
 
   /// "creep of rotor 2"
@@ -23,7 +23,8 @@ struct Term {
   bool same_way(const Term& term) const;  // same effect, form, rotor: only its shape may differ
 };
 
-/// A quantity in every component of the response: the runs' means (n × c), then each cosine coefficient of their course.
+/// A quantity in every component of the response: the runs' means (n × c), then each cosine coefficient of
+/// their course.
 using Components = std::vector<Eigen::MatrixXd>;
 
 /// What a term adds to y, and the derivative by each of its parameters.
@@ -32,8 +33,8 @@ struct TermResponse {
   std::vector<Components> derivative;  // of each parameter; empty for change-points
 };
 
-/// Evaluates a term at its parameters, the forces being those that the rest of the model predicts (n × c, in the
-/// response's unit). Regressors come from predictions, never from measured responses.
+/// Evaluates a term at its parameters, the forces being those that the rest of the model predicts (n × c, in
+/// the response's unit). Regressors come from predictions, never from measured responses.
 TermResponse respond(const Term& term, const Observations& observations, const Eigen::MatrixXd& predicted);
 
 /// Why an effect cannot be tried on this data; empty where it can. `missing`: the covariates that it lacks.
@@ -44,8 +45,10 @@ struct Testability {
 };
 Testability testability(const Effect& effect, const Observations& observations);
 
-/// All ways to try an effect: rotors, shapes on their grids, change-points with three of `open_blocks` on each side.
-std::vector<Term> ways_to_try(const Effect& effect, const Observations& observations, const std::vector<int>& rows);
+/// All ways to try an effect: rotors, shapes on their grids, change-points with three of `open_blocks` on
+/// each side.
+std::vector<Term> ways_to_try(const Effect& effect, const Observations& observations,
+                              const std::vector<int>& rows);
 
 /// Typical values of an effect's covariates.
 std::vector<double> reference_of(const Effect& effect, const Observations& observations);

@@ -53,7 +53,7 @@ class Discard : public FrameSink {
 };
 
 void decoder(benchmark::State& state) {
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     struct Into : PacketSink {
       void packet(const Packet& packet) override { tracker.take(packet, 0, discard); }
       LossTracker tracker{0};
@@ -89,7 +89,7 @@ void decoder_and_recorder(benchmark::State& state) {
   const test::TemporaryFolder folder;
   CampaignFile file = test::new_campaign(folder / "c.db");
   int run = 0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     MemorySource source;
     const LogOutcome outcome = log_run(source, file, test::cells("R" + std::to_string(++run)),
                                        {.duration_s = static_cast<double>(kFrames) / kRig_hz},

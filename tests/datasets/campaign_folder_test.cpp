@@ -58,7 +58,7 @@ struct Folder : testing::Test {
     return import_refusal();
   }
   std::string import_refusal() {
-    const std::string said = message_of([&] { import_campaign_folder(source, db, options()); });
+    std::string said = message_of([&] { import_campaign_folder(source, db, options()); });
     EXPECT_FALSE(fs::exists(db)) << "something was stored of a campaign that was refused";
     EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1)
         << "files were left behind";

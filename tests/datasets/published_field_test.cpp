@@ -30,7 +30,8 @@ TEST(PublishedField, OpenSpaceNumbers) {
   EXPECT_GT(published_ceiling_ratio(0.75), published_ceiling_ratio(2));
   EXPECT_GT(published_ground_ratio(0.75), 1.03);
   double lowest = 2, at = 0;
-  for (double z = 0.75; z <= 6; z += 0.05) {
+  for (int step = 0; step <= 105; ++step) {
+    const double z = 0.75 + 0.05 * step;
     if (published_ground_ratio(z) < lowest) {
       lowest = published_ground_ratio(z);
       at = z;
