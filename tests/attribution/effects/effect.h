@@ -48,6 +48,7 @@ struct Effect {
 
   /// Volts on top of the signal, for effects that show in spectra.
   std::function<double(const Place&, double amplitude)> waveform_V;
+  bool clips = false;  // `change` is what the converter makes of the waveform, so raw counts have it already
 };
 
 /// Change over all rotors or the one that it acts on.

@@ -46,8 +46,8 @@ std::vector<Sized> size_effects(Campaign& campaign) {
                         [](const Effect& e) { return bool(e.scale_covariate); });
   std::vector<Sized> sized;
   for (Effect& effect : effects) {
-    sized.push_back(give_size(std::move(effect), campaign.settings.size, campaign.world, campaign.noise,
-                              campaign.open_space));
+    sized.push_back(
+        give_size(std::move(effect), campaign.settings, campaign.world, campaign.noise, campaign.open_space));
   }
   for (const Sized& one : sized) reject_hidden(one, campaign.world);
   for (Sized& one : sized) measure(one, campaign.world, campaign.noise, campaign.open_space);
@@ -60,6 +60,7 @@ double reading_over_baseline(const Campaign& campaign, std::size_t run, std::siz
                              double time_in_run_s) {
   double change = 0;
   for (const Sized& effect : campaign.effects) {
+    if (campaign.settings.raw && effect.effect.clips) continue;
     change += change_at(effect.effect, {campaign.world, run, rotor, time_in_run_s}, effect.amplitude);
   }
   return (1 + change) * (1 + campaign.scatter[run][rotor]);

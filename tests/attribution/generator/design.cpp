@@ -72,7 +72,7 @@ void place(Conditions& run) {
 class Rig {
  public:
   Rig(Random& random, const Weather& weather, const Design& design)
-      : random_(random), weather_(weather), design_(design), cell_drift_(random, 1800, 30000) {}
+      : random_(random), weather_(weather), design_(design), cell_drift_(random, 1800, 20000) {}
 
   void begin_session() {
     speed_bias_rpm_ = random_.normal(2.5);
@@ -99,10 +99,11 @@ class Rig {
     run.speed_rpm = kNominalSpeed_rpm + std::clamp(speed_bias_rpm_ + random_.normal(5.5), -15.0, 15.0);
     run.tunnel_airspeed_m_s = airspeed_m_s_ * random_.log_uniform(0.4, 2.2);
     run.cell_temperature_C = air.temperature_C + cell_offset_K_ +
-                             2.5 * -std::expm1(-run.session_time_h / 0.8) + 0.9 * cell_drift_(run.start_s);
+                             2.5 * -std::expm1(-run.session_time_h / 0.8) +
+                             design_.cell_swing_K * cell_drift_(run.start_s);
     run.supply_voltage_V = supply();
     run.cable_slack_mm = std::max(0.0, slack_mm_ + random_.normal(4));
-    run.vibration_V = random_.log_uniform(0.2, 1);
+    run.vibration = random_.log_uniform(0.2, 1);
     round_as_recorded(run);
     const double pause_s = random_.uniform(130, 260);
     supply_used_h_ += (run.time_since_motor_start_s + pause_s) / 3600;

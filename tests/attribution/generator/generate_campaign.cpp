@@ -86,6 +86,8 @@ int main(int argc, char** argv) {
                  "True effect; twice for a pair. Without it the track draws one");
   app.add_option("--size", settings.size, "Rms of an effect over the scatter at its level")
       ->capture_default_str();
+  app.add_flag("--size-over-run-scatter", settings.size_over_run_scatter,
+               "Sizes are over the run scatter, also of effects that vary by session");
   app.add_option("--run-scatter", settings.run_scatter, "Relative, of one rotor")->capture_default_str();
   app.add_option("--seed", settings.seed, "Of everything that is drawn")->capture_default_str();
   app.add_flag("--unequal-repeats", settings.unequal_repeats, "Locations are repeated unevenly");

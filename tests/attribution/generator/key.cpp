@@ -1,5 +1,5 @@
 #include "attribution/generator/campaign.h"
-#include "attribution/generator/raw_runs.h"
+#include "attribution/generator/oracle.h"
 
 #include <nlohmann/json.hpp>
 
@@ -17,7 +17,7 @@ ordered_json in_units(const std::string& name, const std::string& unit, double v
   return list;
 }
 
-ordered_json effect_json(const Sized& sized) {
+ordered_json effect_json(const Sized& sized, const Campaign& campaign) {
   const Effect& effect = sized.effect;
   ordered_json parameters = in_units(effect.amplitude_name, effect.amplitude_unit, sized.amplitude);
   for (const Parameter& parameter : effect.fixed) {
@@ -31,6 +31,8 @@ ordered_json effect_json(const Sized& sized) {
           {"rms", sized.rms},
           {"rms_over_run_scatter", sized.rms_over_run},
           {"rms_over_level_scatter", sized.rms_over_level},
+          {"distance_from_none_sigma", distance_sigma(changes_of(effect, sized.amplitude, campaign.world), {},
+                                                      campaign.world, campaign.noise, campaign.open_space)},
           {"parameters", parameters}};
 }
 
@@ -72,7 +74,7 @@ std::string key_json(const Campaign& campaign) {
                         {"root_N", campaign.floor.root_N},
                         {"with_coefficients_N", campaign.floor.with_coefficients_N}}},
                       {"explain_arguments", ordered_json::array()}};
-  for (const Sized& effect : campaign.effects) key["effects"].push_back(effect_json(effect));
+  for (const Sized& effect : campaign.effects) key["effects"].push_back(effect_json(effect, campaign));
   if (campaign.open_space) key["explain_arguments"] = {"--baseline", "open_space"};
   return key.dump(1) + "\n";
 }

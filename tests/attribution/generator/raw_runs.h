@@ -5,9 +5,6 @@
 
 namespace tunnelrig::attribution {
 
-inline constexpr double kZero_V = 0.34;
-inline constexpr double kGain_V_N = 0.242;
-
 /// Writes raw/RUN.npy of every run, int16 counts of four channels at 1333.3 Hz.
 void write_raw_runs(const Campaign& campaign, const std::filesystem::path& folder);
 

@@ -41,7 +41,8 @@ struct Settings {
   double raw_duration_s = 6;
   std::vector<SeparatingRun> separating;
 
-  double run_scatter = 0.0024;  // relative, of one rotor
+  bool size_over_run_scatter = false;  // whatever the level, sizes are over the run scatter
+  double run_scatter = 0.0024;         // relative, of one rotor
   int separating_sessions = 4, separating_repeats = 3;
 };
 

@@ -21,7 +21,7 @@ struct Sized {
 /// Finds the amplitude, or for known physics the factor by which the covariate's excursions grow or shrink,
 /// which changes `world`. Where the covariate cannot grow as far (humidity ends at 0 and 1), `noise` shrinks
 /// instead. `free_mean`: location means are not taken out (the baseline of open space has one coefficient).
-Sized give_size(Effect effect, double size, World& world, NoiseModel& noise, bool free_mean);
+Sized give_size(Effect effect, const Settings& settings, World& world, NoiseModel& noise, bool free_mean);
 
 /// Size of the effect as it stands.
 void measure(Sized& sized, const World& world, const NoiseModel& noise, bool free_mean);

@@ -28,6 +28,10 @@ constexpr std::array kIdentifiable = {"air_pressure",
                                       "ground_effect",
                                       "ceiling_effect"};
 
+/// Effects with a signature inside the run, for raw campaigns.
+constexpr std::array kWithinRun = {"motor_warm_up", "wake_recirculation", "creep",
+                                   "mains_pickup",  "vibration_alias",    "adc_clipping"};
+
 /// Pairs that are clear of one another when both act at once; two of one covariate are not asked for.
 constexpr std::array kForTwo = {"air_pressure",           "rotor_speed",     "supply_voltage",
                                 "motor_warm_up",          "axial_wind",      "creep",
@@ -45,7 +49,7 @@ struct Pair {
 };
 
 constexpr double kLevel = 0.004;  // spread of thrust at which a gain and an offset look alike
-constexpr double kWide = 0.22;    // and at which they do not
+constexpr double kWide = 0.28;    // and at which they do not
 
 constexpr std::array<Pair, 10> kPairs = {{
     {"span_drift_temperature", "zero_drift_temperature", Places::kGrid, 0, false},
@@ -71,6 +75,10 @@ Design design_for(const std::string& effect) {
                            "mounting_step", "propeller_step", "temperature_gradient", "reynolds_number"}) {
     if (effect == name) design.thrust_spread = kWide;
   }
+  if (effect == "zero_drift_temperature" || effect == "span_drift_temperature" ||
+      effect == "temperature_gradient") {
+    design.cell_swing_K = 3.5;
+  }
   return design;
 }
 
@@ -78,6 +86,7 @@ Design join(const Design& a, const Design& b) {
   Design both = a;
   if (b.places != Places::kGrid) both.places = b.places;
   both.thrust_spread = std::max(a.thrust_spread, b.thrust_spread);
+  both.cell_swing_K = std::max(a.cell_swing_K, b.cell_swing_K);
   both.hot_weather = a.hot_weather || b.hot_weather;
   return both;
 }
@@ -165,7 +174,8 @@ Truth draw_truth(const Settings& settings) {
       if (!settings.effects.empty()) throw InputError("--track none: has no effect; leave --effect out");
       return draw_none(random);
     case Track::kOne:
-      return draw_single(settings, kIdentifiable, random);
+      return settings.raw ? draw_single(settings, kWithinRun, random)
+                          : draw_single(settings, kIdentifiable, random);
     case Track::kTwo:
       return draw_two(settings, random);
     case Track::kConfounded:

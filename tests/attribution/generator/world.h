@@ -15,6 +15,11 @@ inline constexpr double kRadius_m = 0.1524;
 inline constexpr double kChord_m = 0.025;
 inline constexpr double kStandardPressure_Pa = 101325;
 inline constexpr double kGasConstant_J_kgK = 287.058;
+
+// Load cells and converter: volts = zero + gain * force.
+inline constexpr double kZero_V = 0.34;
+inline constexpr double kGain_V_N = 0.242;
+inline constexpr double kFullScale_V = 3.3 * 4095 / 4096;
 inline constexpr double kFar_R = std::numeric_limits<double>::infinity();
 
 /// One run. Members that end up in a column of runs.csv have the column's name.
@@ -34,7 +39,7 @@ struct Conditions {
   double time_of_day_h = 12, cable_slack_mm = 0;  // columns of a laboratory's own
   double speed_factor = 1;  // thrust of a speed that was chosen, over that of the nominal speed
   bool proposed = false;    // brought to a setting that shall tell two effects apart
-  double vibration_V = 0;   // amplitude of the shaft line at the converter, raw campaigns
+  double vibration = 0;     // strength of the shaft's line where a cell resonates, raw campaigns
 };
 
 using Rotors = std::array<double, kRotors>;
