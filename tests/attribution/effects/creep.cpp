@@ -6,7 +6,7 @@ namespace tunnelrig::attribution {
 
 // The cell yields under load: F (1 + c (1 - e^(-t / tau))), c > 0, t since the load came on.
 Effect creep(Random& random) {
-  const double tau_s = random.log_uniform(60, 300);
+  const double tau_s = random.log_uniform(50, 250);
   return {.name = "creep",
           .covariates = {"time_since_motor_start_s"},
           .fixed = {{"tau", "s", tau_s}},

@@ -6,7 +6,7 @@ namespace tunnelrig::attribution {
 
 // A cold motor gives more: T (1 + a e^(-t / tau)), t since motor start, a > 0.
 Effect motor_warm_up(Random& random) {
-  const double tau_s = random.log_uniform(60, 300);
+  const double tau_s = random.log_uniform(50, 250);
   return {.name = "motor_warm_up",
           .covariates = {"time_since_motor_start_s"},
           .fixed = {{"tau", "s", tau_s}},

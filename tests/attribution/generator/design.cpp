@@ -173,6 +173,7 @@ void add_separating_sessions(World& world, const Settings& settings, Rig& rig, R
         for (const bool proposed : {false, true}) {
           Conditions run;
           run.session = session;
+          run.added = true;
           run.location = proposal.location.empty() ? world.runs.front().location : proposal.location;
           run.repeat = ++repeats[run.location];
           place(run);
@@ -190,7 +191,8 @@ Rotors coefficients(const Design& design, Random& random) {
   const double spread = design.thrust_spread;
   const double common = std::clamp(random.normal(spread), -2 * spread, 2 * spread);
   Rotors values{};
-  for (double& value : values) value = 0.1056 / 4 * std::exp(common - spread + random.normal(0.2 * spread));
+  for (double& value : values)
+    value = 0.1056 / 4 * std::exp(common - 1.8 * spread + random.normal(0.2 * spread));
   return values;
 }
 

@@ -32,7 +32,7 @@ double coefficient_variance(const NoiseModel& model, const World& world, int fir
   const auto sealed = [&](const Conditions& run) { return run.session % 4 == first_sealed; };
   std::map<int, std::vector<Eigen::Index>> sessions;
   for (const Conditions& run : world.runs) {
-    if (sealed(run) || run.proposed) continue;
+    if (sealed(run) || run.added) continue;
     const auto place = index.emplace(run.location, static_cast<Eigen::Index>(index.size())).first;
     sessions[run.session].push_back(place->second);
   }
@@ -53,7 +53,7 @@ double coefficient_variance(const NoiseModel& model, const World& world, int fir
   int count = 0;
   for (const Conditions& held_out : world.runs) {
     const auto place = index.find(held_out.location);
-    if (!sealed(held_out) || held_out.proposed || place == index.end()) continue;
+    if (!sealed(held_out) || held_out.added || place == index.end()) continue;
     sum += covariance(place->second, place->second);
     ++count;
   }
@@ -100,7 +100,7 @@ NoiseFloor noise_floor(const NoiseModel& model, const World& world) {
   double square = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < world.runs.size(); ++i) {
-    if (world.runs[i].proposed) continue;
+    if (world.runs[i].added) continue;
     for (const double thrust_N : world.baseline_N[i]) square += thrust_N * thrust_N;
     count += kRotors;
   }

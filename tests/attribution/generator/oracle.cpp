@@ -66,7 +66,7 @@ std::vector<Rotors> changes_of(const Effect& effect, double amplitude, const Wor
 double distance_sigma(const std::vector<Rotors>& signal, const std::vector<Rotors>& other, const World& world,
                       const NoiseModel& noise, bool one_coefficient) {
   Eigen::Index ordinary = 0;
-  for (const Conditions& run : world.runs) ordinary += run.proposed ? 0 : 1;
+  for (const Conditions& run : world.runs) ordinary += run.added ? 0 : 1;
   const Eigen::MatrixXd places = locations(world, ordinary, one_coefficient);
   double signal_signal = 0, signal_other = 0, other_other = 0;
   for (std::size_t mode = 0; mode < kRotors; ++mode) {

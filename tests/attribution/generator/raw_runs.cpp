@@ -22,7 +22,7 @@ class CellNoise {
  public:
   explicit CellNoise(Random& random) : random_(random) {}
   double next() {
-    slow_ = 0.97 * slow_ + random_.normal(0.002);
+    slow_ = 0.97 * slow_ + random_.normal(0.001);
     return slow_ + random_.normal(0.004);
   }
 

@@ -31,13 +31,13 @@ Spread spread_of(const Effect& effect, double amplitude, const World& world, boo
     std::map<std::string, Mean> places;
     const auto place = [&](const Conditions& run) { return free_mean ? std::string() : run.location; };
     for (std::size_t i = 0; i < change.size(); ++i) {
-      if (world.runs[i].proposed) continue;
+      if (world.runs[i].added) continue;
       change[i] = change_at(effect, {world, i, rotor}, amplitude);
       places[place(world.runs[i])].add(change[i]);
     }
     std::map<int, Mean> sessions;
     for (std::size_t i = 0; i < change.size(); ++i) {
-      if (world.runs[i].proposed) continue;
+      if (world.runs[i].added) continue;
       change[i] -= places[place(world.runs[i])].value();
       sessions[world.runs[i].session].add(change[i]);
       square += change[i] * change[i];
@@ -50,7 +50,7 @@ Spread spread_of(const Effect& effect, double amplitude, const World& world, boo
 
 double runs_per_session(const World& world) {
   double ordinary = 0;
-  for (const Conditions& run : world.runs) ordinary += run.proposed ? 0 : 1;
+  for (const Conditions& run : world.runs) ordinary += run.added ? 0 : 1;
   return ordinary / world.blocks;
 }
 
@@ -88,7 +88,7 @@ void scale_to(const Effect& effect, const Settings& settings, World& world, Nois
     scale(effect, original, world, std::min(factor, 4.0));
   }
   const double reached = spread_of(effect, effect.theory, world, free_mean).rms / target;
-  if (reached < 0.999) {
+  if (std::abs(reached - 1) > 1e-3) {
     noise.run *= reached;
     noise.session *= reached;
   }

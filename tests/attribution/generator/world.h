@@ -38,6 +38,7 @@ struct Conditions {
   double time_since_motor_start_s = 60;
   double time_of_day_h = 12, cable_slack_mm = 0;  // columns of a laboratory's own
   double speed_factor = 1;  // thrust of a speed that was chosen, over that of the nominal speed
+  bool added = false;       // of a session that was added to tell two effects apart
   bool proposed = false;    // brought to a setting that shall tell two effects apart
   double vibration = 0;     // strength of the shaft's line where a cell resonates, raw campaigns
 };

@@ -26,7 +26,7 @@ class Reader {
   double number(const json& object, const std::string& name, const std::string& path) {
     const json& value = member(object, name, path);
     if (value.is_number() && std::isfinite(value.get<double>())) return value.get<double>();
-    if (!value.is_null()) broken_.push_back(path + name + " is no finite number");
+    if (object.is_object() && object.contains(name)) broken_.push_back(path + name + " is no finite number");
     return std::nan("");
   }
 
