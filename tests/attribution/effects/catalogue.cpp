@@ -51,6 +51,7 @@ Effect make_effect(std::string_view name, Random& random) {
 
 std::vector<std::string> effect_names() {
   std::vector<std::string> names;
+  names.reserve(kEffects.size());
   for (const auto& entry : kEffects) names.emplace_back(entry.first);
   return names;
 }

@@ -45,6 +45,7 @@ std::vector<Sized> size_effects(Campaign& campaign) {
   std::stable_partition(effects.begin(), effects.end(),
                         [](const Effect& e) { return bool(e.scale_covariate); });
   std::vector<Sized> sized;
+  sized.reserve(effects.size());
   for (Effect& effect : effects) {
     sized.push_back(
         give_size(std::move(effect), campaign.settings, campaign.world, campaign.noise, campaign.open_space));

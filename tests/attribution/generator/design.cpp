@@ -45,7 +45,7 @@ std::vector<Visit> plan_visits(const Settings& settings, const Design& design, R
   if (settings.order == Order::kRandomised) random.shuffle(visits);
   // reference runs are spread evenly, so that every session has some
   for (int i = 0; i < at_reference; ++i) {
-    const auto at = static_cast<std::ptrdiff_t>(4 * i + static_cast<int>(random.below(4)));
+    const auto at = 4 * static_cast<std::ptrdiff_t>(i) + static_cast<std::ptrdiff_t>(random.below(4));
     visits.insert(visits.begin() + std::min(at, static_cast<std::ptrdiff_t>(visits.size())),
                   {"OS", settings.runs + i});
   }

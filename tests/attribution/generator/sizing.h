@@ -19,8 +19,9 @@ struct Sized {
 };
 
 /// Finds the amplitude, or for known physics the factor by which the covariate's excursions grow or shrink,
-/// which changes `world`. Where the covariate cannot grow as far (humidity ends at 0 and 1), `noise` shrinks
-/// instead. `free_mean`: location means are not taken out (the baseline of open space has one coefficient).
+/// which changes `world`. Where the covariate does not reach (humidity ends at 0 and 1, and at
+/// a steady humidity vapour still follows the temperature), `noise` is scaled instead. `free_mean`: location
+/// means are not taken out (the baseline of open space has one coefficient).
 Sized give_size(Effect effect, const Settings& settings, World& world, NoiseModel& noise, bool free_mean);
 
 /// Size of the effect as it stands.

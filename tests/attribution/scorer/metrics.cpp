@@ -243,7 +243,9 @@ void add_details(Table& table, std::span<const Outcome> outcomes, const MetricOp
   for (const Outcome& o : outcomes) {
     if (o.key.track == "one" && main_design(o)) groups.insert({o.key.size, group_of(o)});
   }
-  for (const auto& [size, group] : groups) {
+  for (const auto& size_and_group : groups) {
+    const double size = size_and_group.first;
+    const std::string& group = size_and_group.second;
     const auto in_group = [&](const auto& judge) {
       return [&, judge](const Outcome& o) -> std::optional<bool> {
         if (!on("one", size, judge)(o) || group_of(o) != group) return {};

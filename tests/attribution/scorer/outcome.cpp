@@ -73,7 +73,7 @@ FoundEffect parse_found(const json& entry, Reader& reader) {
   const json& parameters = reader.member(entry, "parameters", path);
   if (!parameters.is_object()) return found;
   for (const auto& [name, value] : parameters.items()) {
-    const std::string where = path + "parameters." + name + ".";
+    const std::string where = fmt::format("{}parameters.{}.", path, name);
     const auto [low, high] = reader.bounds(value, "ci95", where);
     found.parameters.push_back(
         {name, reader.text(value, "unit", where), reader.number(value, "value", where), low, high});
