@@ -347,7 +347,7 @@ TEST(Separating, ProposedRunsComeOnTopOfTheSameCampaign) {
   const Campaign before = generate(settings);
   settings.separating = {{.setting = {{"speed_rpm", 4000}}, .location = "OS"}};
   const Campaign after = generate(settings);
-  ASSERT_EQ(after.world.runs.size(), before.world.runs.size() + 24);
+  ASSERT_EQ(after.world.runs.size(), before.world.runs.size() + 48);
   for (std::size_t i = 0; i < before.world.runs.size(); ++i) {
     ASSERT_EQ(after.measured_N[i], before.measured_N[i]);
   }

@@ -43,7 +43,7 @@ struct Settings {
 
   bool size_over_run_scatter = false;  // whatever the level, sizes are over the run scatter
   double run_scatter = 0.0024;         // relative, of one rotor
-  int separating_sessions = 4, separating_repeats = 3;
+  int separating_sessions = 4, separating_repeats = 6;
 };
 
 }  // namespace tunnelrig::attribution

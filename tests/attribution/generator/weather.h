@@ -24,14 +24,14 @@ struct Air {
 
 class Weather {
  public:
-  Weather(Random& random, bool hot);
+  Weather(Random& random, bool hot, double pressure_swing_Pa);
 
   /// `session_time_h` since people, lamps and motors began to warm the room.
   Air at(double time_s, double session_time_h) const;
 
  private:
   Course fronts_, warmth_, moisture_;
-  double mean_C_;
+  double mean_C_, pressure_swing_Pa_;
 };
 
 }  // namespace tunnelrig::attribution
