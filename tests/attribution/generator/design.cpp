@@ -75,7 +75,7 @@ class Rig {
       : random_(random), weather_(weather), design_(design), cell_drift_(random, 1800, 20000) {}
 
   void begin_session() {
-    speed_bias_rpm_ = random_.normal(2.5);
+    speed_bias_rpm_ = random_.normal(0.45 * design_.speed_scatter_rpm);
     airspeed_m_s_ = random_.uniform(0.15, 1.1);
     cell_offset_K_ = random_.normal(1.2);
     full_supply_V_ = random_.uniform(15.1, 15.3);
@@ -96,7 +96,8 @@ class Rig {
     run.air_temperature_C = air.temperature_C;
     run.air_pressure_Pa = air.pressure_Pa;
     run.relative_humidity = air.humidity;
-    run.speed_rpm = kNominalSpeed_rpm + std::clamp(speed_bias_rpm_ + random_.normal(5.5), -15.0, 15.0);
+    run.speed_rpm = kNominalSpeed_rpm +
+                    std::clamp(speed_bias_rpm_ + random_.normal(design_.speed_scatter_rpm), -15.0, 15.0);
     run.tunnel_airspeed_m_s = airspeed_m_s_ * random_.log_uniform(0.4, 2.2);
     run.cell_temperature_C = air.temperature_C + cell_offset_K_ +
                              2.5 * -std::expm1(-run.session_time_h / 0.8) +

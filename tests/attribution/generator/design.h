@@ -16,8 +16,9 @@ struct Design {
     kOpenSpace   // OS, GND, CEIL
   };
   Places places = Places::kGrid;
-  double thrust_spread = 0.02;     // of the rotors' coefficients between locations, relative
-  bool sagging_supply = false;     // falls in proportion to the time in the session and with nothing else
+  double thrust_spread = 0.02;  // of the rotors' coefficients between locations, relative
+  bool sagging_supply = false;  // falls in proportion to the time in the session and with nothing else
+  double speed_scatter_rpm = 5.5;
   double pressure_swing_Pa = 450;  // of the weather
   double cell_swing_K = 0.9;       // of a cell's temperature within hours
   bool hot_weather = false;        // humid air weighs less than dry air only where it is warm

@@ -124,8 +124,11 @@ Truth draw_confounded(const Settings& settings, Random& random) {
   truth.design.places = pair.places;
   truth.design.sagging_supply = pair.sagging_supply;
   truth.design.cell_swing_K = design_for(pair.truth).cell_swing_K;
-  // pressure is in the Reynolds number and not in the Mach number
-  if (truth.effects[0] == "reynolds_number") truth.design.pressure_swing_Pa = 50;
+  if (truth.effects[0] == "reynolds_number") {
+    // pressure is in the Reynolds number and not in the Mach number; speed weighs less in it than temperature
+    truth.design.pressure_swing_Pa = 50;
+    truth.design.speed_scatter_rpm = 0.8;
+  }
   truth.design.thrust_spread = kLevel;
   return truth;
 }
