@@ -298,7 +298,7 @@ double nearest(const Campaign& campaign, const std::string& other) {
   const Sized& truth = campaign.effects.front();
   const auto signal = changes_of(truth.effect, truth.amplitude, campaign.world);
   double best = 1e300;
-  for (std::uint64_t draw = 0; draw < 30; ++draw) {
+  for (std::uint64_t draw = 0; draw < 100; ++draw) {
     Random random(draw, "partner");
     Effect partner = make_effect(other, random);
     if (partner.rotor) partner.rotor = truth.effect.rotor;
