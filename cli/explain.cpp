@@ -4,6 +4,7 @@
 #include "cli/console.h"
 #include "cli/verb.h"
 #include "datasets/error.h"
+#include "datasets/observations.h"
 
 #include <memory>
 
@@ -27,6 +28,8 @@ std::vector<const Effect*> candidates() {
 
 Observations observations_of_file(const Options& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
+  if (file.text("table.toml"))
+    return observe_table(observations_of(file), {options.response, options.baseline});
   CampaignData data = read_campaign_data(file);
   read_run_windows(file, data);
   return observe_campaign(data, {options.response, options.baseline});

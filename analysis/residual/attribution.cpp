@@ -418,7 +418,8 @@ class Search {
                                       [&](const Ranked& r) { return r.term.effect->name == name; });
       if (listed) continue;
       const LossDifference difference = compare(validate(scan.candidates[i]), *own);
-      if (difference.mean >= 2 * difference.standard_error) continue;
+      if (difference.mean >= 2 * std::min(difference.standard_error, difference.expected_standard_error))
+        continue;
       Term term = scan.ways[i];
       term.parameters[0] = scan.fits[i].amplitude(0);
       result.push_back({term, scan.fits[i].evidence, 0, scan.fits[i].amplitude(0), 0});
