@@ -48,13 +48,16 @@ int run(Options options) {
   if (options.list) return list(options);
   if (options.db.empty()) throw InputError("--db is required (all but --list need a campaign)");
   const Observations observations = observations_of_file(options);
+  const std::vector<Effect> axes = effects_of_other_axes(observations);
+  std::vector<const Effect*> effects = candidates();
+  for (const Effect& axis : axes) effects.push_back(&axis);
   ProgressBar progress("explaining");
   double step = 0;
   options.search.progress = [&](const std::string& what) {
     step += 1;
     progress.show(step, step + 3, what);
   };
-  const Explanation explanation = explain(observations, candidates(), options.search);
+  const Explanation explanation = explain(observations, effects, options.search);
   for (const std::string& warning : explanation.warnings) warn(warning);
   const std::string json = explanation_json(explanation);
   if (options.json == "-")

@@ -54,7 +54,8 @@ struct Attribution {
   std::vector<Accepted> accepted;
   std::vector<FoundCurve> curves;
   bool session_unknown = false;
-  JointFit baseline, final;  // without and with the accepted terms and curves
+  JointFit baseline, final;   // without and with the accepted terms and curves
+  Observations observations;  // what `final` speaks of: with a group's own amplitudes among its baseline
   std::vector<Round> rounds, curve_rounds;
   double detectable_sigma = 0;  // rms of an effect, in y, that is found at 80 % power
 };

@@ -81,6 +81,9 @@ struct Explanation {
   Eigen::MatrixXd residual_before, residual_after;  // n × c, unit of the response
 };
 
+/// Crosstalk from a table's other axes, as candidates of their own.
+std::vector<Effect> effects_of_other_axes(const Observations& observations);
+
 /// The protocol: seal, search on the open runs, open the seal once, estimate on all.
 Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
                     const SearchSettings& settings);

@@ -20,7 +20,7 @@ struct FreeParameter {
 
 bool is_free(const Term& term, std::size_t k) {
   const EffectParameter& parameter = term.effect->parameters[k];
-  if (parameter.role == ParameterRole::kChangePoint) return false;
+  if (parameter.role == ParameterRole::kChangePoint || term.per_group) return false;
   return !(k == 0 && term.at_theory);
 }
 
@@ -192,6 +192,7 @@ LinearModel linearise(const Observations& observations, const MeanModel& model, 
       Components(1 + observations.shape.size(), MatrixXd::Zero(observations.rows(), observations.channels())),
       {}};
   for (const Term& term : model.terms) {
+    if (term.per_group) continue;  // a part of the baseline (Observations::slopes)
     TermResponse response = respond(term, observations, predicted);
     for (std::size_t k = 0; k < linear.offset.size(); ++k) linear.offset[k] += response.value[k];
     for (std::size_t k = 0; k < response.derivative.size(); ++k)

@@ -82,11 +82,13 @@ void set_response(const Source& source, const ObservationChoice& choice, Observa
   result.response = own ? column.column : choice.response;
   if (!own) source.table.sheet.require(choice.response);
   result.unit = own ? (column.meaning == "thrust_N" ? "N" : column.unit) : "";
+  result.coefficient = own && column.meaning.starts_with("c_t");
   const MatrixXd ones = MatrixXd::Ones(source.count(), 1);
   result.value = result.known = ones;
   // C_T is what is constant where speed and diameter are known; a baseline in another column replaces that.
   const bool reduced =
       own && column.meaning == "thrust_N" && choice.baseline.empty() && source.table.schema.speed_column;
+  result.coefficient = result.coefficient || reduced;
   for (Index r = 0; r < source.count(); ++r) {
     const Observation& row = source.row(r);
     result.value(r, 0) = own ? row.response : source.cell(r, choice.response);
@@ -211,6 +213,16 @@ void set_hold_out(const Source& source, Observations& result) {
     throw InputError::in("table.toml", "hold_out = \"{}\" takes all rows or none", text);
 }
 
+/// Columns of the same quantity as the baseline's, for crosstalk.
+void set_other_axes(const TableSchema& schema, const std::string& baseline, Observations& result) {
+  std::string_view quantity;
+  for (const TableColumn& column : schema.covariates)
+    if (column.column == baseline) quantity = unit_from_name(column.unit).quantity;
+  for (const TableColumn& column : schema.covariates)
+    if (column.column != baseline && !quantity.empty() && unit_from_name(column.unit).quantity == quantity)
+      result.other_axes.push_back(column.meaning.empty() ? column.column : column.meaning);
+}
+
 /// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
 void set_baseline(const Source& source, const ObservationChoice& choice, Observations& result) {
   result.baseline = choice.baseline.empty() ? "constant" : choice.baseline;
@@ -230,14 +242,15 @@ void set_baseline(const Source& source, const ObservationChoice& choice, Observa
   }
   if (kind == "power" && !result.multiplicative)
     throw InputError(fmt::format("--baseline {}: the response has both signs", choice.baseline));
-  result.slopes = MatrixXd::Zero(source.count(), result.groups());
+  result.slopes.resize(source.count(), 1);
   for (Index r = 0; r < source.count(); ++r) {
     const double x = source.cell(r, column);
     if (std::isnan(x) || (kind == "power" && x <= 0))
       throw InputError::at(source.table.sheet.file, source.row(r).line, "--baseline {}: column {} is {}",
                            result.baseline, column, std::isnan(x) ? "empty" : "not above 0");
-    result.slopes(r, result.group[static_cast<std::size_t>(r)]) = kind == "power" ? std::log(x) : x;
+    result.slopes(r, 0) = kind == "power" ? std::log(x) : x;
   }
+  if (kind == "linear") set_other_axes(source.table.schema, column, result);
   std::erase_if(result.covariates, [&](const Covariate& covariate) { return covariate.name == column; });
 }
 

@@ -14,8 +14,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kBeyond = 0.5;                     // of a condition's range, on either side of what was seen
-constexpr double kSlowest = 0.75, kFastest = 1.15;  // of the usual speed
+constexpr double kBeyond = 0.5;                    // of a condition's range, on either side of what was seen
+constexpr double kSlowest = 0.6, kFastest = 1.15;  // of the usual speed
 constexpr std::size_t kMostConditions = 5;
 
 /// A run that could be made: a place, and what differs there from an ordinary run.
