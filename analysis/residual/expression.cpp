@@ -42,7 +42,7 @@ std::string with_identifiers(std::string_view text, const std::string& file,
     const auto end = text.find('\'', at + 1);
     if (end == std::string_view::npos)
       throw InputError::in(file, "the expression {} has a quote without an end", text);
-    const std::string name(text.substr(at + 1, end - at - 1));
+    std::string name(text.substr(at + 1, end - at - 1));
     at = end + 1;
     return name;
   };

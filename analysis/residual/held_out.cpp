@@ -58,7 +58,8 @@ void own_constants(const Observations& observations, const std::vector<int>& row
       runs[observations.group[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
   for (const auto& [group, members] : runs) {
     Eigen::RowVectorXd constant = Eigen::RowVectorXd::Zero(plain.cols());
-    const double used = static_cast<double>((members.size() + 1) / 2);
+    const std::size_t halves = (members.size() + 1) / 2;
+    const double used = static_cast<double>(halves);
     for (std::size_t m = 0; m < members.size(); m += 2) constant += plain.row(members[m]) / used;
     for (std::size_t m = 1; m < members.size(); m += 2) {
       residual.row(members[m]) = plain.row(members[m]) - constant;
