@@ -19,5 +19,6 @@ void add_reduce(CLI::App& app, Work& run);
 void add_map(CLI::App& app, Work& run);
 void add_report(CLI::App& app, Work& run);
 void add_doctor(CLI::App& app, Work& run);
+void add_devices(CLI::App& app, Work& run);
 
 }  // namespace tunnelrig::cli
