@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 extern "C" {
 #include "otg_fs.h"
@@ -60,7 +61,7 @@ void behave_well(RegisterModel& model) {
   };
   model.on_read[RCC_CFGR] = [](std::uint32_t v) { return v | ((v & 3u) << 2); };  // SWS follows SW
   model.values[OTG_GRSTCTL] = 0x80000000u;                                        // AHB idle
-  model.on_write[OTG_GRSTCTL] = [](std::uint32_t) {};                             // resets and flushes end at once
+  model.on_write[OTG_GRSTCTL] = [](std::uint32_t) {};  // resets and flushes end at once
   const auto clear_ones = [&model](std::uint32_t address) {
     model.on_write[address] = [&model, address](std::uint32_t v) { model.values[address] &= ~v; };
   };
@@ -136,7 +137,8 @@ void OtgHost::receive(std::uint32_t kind, const std::vector<std::uint8_t>& bytes
   status_ = (kind << 17) | (static_cast<std::uint32_t>(bytes.size()) << 4);
   for (std::size_t i = 0; i < bytes.size(); i += 4) {
     std::uint32_t word = 0;
-    for (std::size_t k = 0; k < 4 && i + k < bytes.size(); ++k) word |= std::uint32_t{bytes[i + k]} << (8 * k);
+    for (std::size_t k = 0; k < 4 && i + k < bytes.size(); ++k)
+      word |= std::uint32_t{bytes[i + k]} << (8 * k);
     words_.push_back(word);
   }
   otg_fs_interrupt();
@@ -167,7 +169,8 @@ std::vector<std::uint8_t> OtgHost::in(std::uint32_t n) {
     otg_fs_interrupt();  // fills the FIFO
     if (fifo_[n].empty()) throw std::logic_error("the FIFO stays empty");
     for (const std::uint32_t word : fifo_[n]) {
-      for (unsigned k = 0; k < 4 && left > 0; ++k, --left) bytes.push_back(static_cast<std::uint8_t>(word >> (8 * k)));
+      for (unsigned k = 0; k < 4 && left > 0; ++k, --left)
+        bytes.push_back(static_cast<std::uint8_t>(word >> (8 * k)));
       if (bytes.size() % 64 == 0) continue;
     }
     fifo_[n].clear();

@@ -1,5 +1,5 @@
-// The registers of the F405 as far as the drivers touch them: every access is written down, and some bits answer as the
-// hardware's would. Simulated from the reference manual, not from the drivers.
+// The registers of the F405 as far as the drivers touch them: every access is written down, and some bits
+// answer as the hardware's would. Simulated from the reference manual, not from the drivers.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +31,8 @@ class RegisterModel {
   int first_with(std::uint32_t address, std::uint32_t bits) const;
 
   std::map<std::uint32_t, std::uint32_t> values;
-  std::map<std::uint32_t, std::function<std::uint32_t(std::uint32_t)>> on_read;   // value stored -> value read
-  std::map<std::uint32_t, std::function<void(std::uint32_t)>> on_write;           // instead of storing
+  std::map<std::uint32_t, std::function<std::uint32_t(std::uint32_t)>> on_read;  // value stored -> value read
+  std::map<std::uint32_t, std::function<void(std::uint32_t)>> on_write;          // instead of storing
   std::vector<Write> writes;
   std::uint64_t reads = 0;
 };
@@ -49,7 +49,8 @@ class OtgHost {
   void enumeration_done();
   void setup(const std::vector<std::uint8_t>& packet);
   void out(const std::vector<std::uint8_t>& data);
-  /// The bytes of the IN transfer of endpoint `n` that is armed, which then is done; empty where it is a status stage.
+  /// The bytes of the IN transfer of endpoint `n` that is armed, which then is done; empty where it is a
+  /// status stage.
   std::vector<std::uint8_t> in(std::uint32_t n);
   bool in_armed(std::uint32_t n) const;
 
