@@ -138,9 +138,9 @@ UsbStream::~UsbStream() {
   // Transfers that the system does not give back are left to it, with the bus they are on; freeing them would
   // be worse.
   static std::mutex mutex;
-  static std::vector<std::shared_ptr<State>> left_behind;
+  static auto* const left_behind = new std::vector<std::shared_ptr<State>>;  // not even at the exit
   const std::lock_guard lock(mutex);
-  left_behind.push_back(state_);
+  left_behind->push_back(state_);
   handle_->bus().abandon();
 }
 

@@ -89,6 +89,7 @@ void on_sampling(void) {
     board_on_adc_error(&instrument, frames_missed(&instrument));
   }
   uint32_t took = RD(DWT_CYCCNT) - began;
+  /* cppcheck-suppress unsignedLessThanZero ; the two reads are of a running counter */
   if (took > instrument.isr_cycles) instrument.isr_cycles = took;
 }
 

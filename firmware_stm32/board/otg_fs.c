@@ -53,17 +53,22 @@ static void flush_transmit(uint32_t fifo) {
   (void)wait_for(OTG_GRSTCTL, BIT(5), 0, kPolls);
 }
 
+/* Up to four bytes, the first lowest. */
+static uint32_t word_of(const uint8_t* data, uint32_t size) {
+  if (size >= 4) return trw_get32(data);
+  uint32_t word = 0;
+  while (size > 0) word = (word << 8) | data[--size];
+  return word;
+}
+
 /* 34.17.5: a packet goes into the FIFO word by word, once there is room for the whole of it. */
 static void fill_fifo(uint32_t n) {
   transfer* t = &in[n];
-  while (t->left > 0) {
-    uint32_t size = t->left < USB_PACKET ? t->left : USB_PACKET;
+  while (t->left != 0) {
+    uint32_t size = t->left;
+    if (size > USB_PACKET) size = USB_PACKET;
     if ((RD(OTG_DTXFSTS(n)) & 0xFFFFu) < (size + 3u) / 4u) return;
-    for (uint32_t i = 0; i < size; i += 4) {
-      uint32_t word = 0;
-      for (uint32_t k = 0; k < 4 && i + k < size; ++k) word |= (uint32_t)t->data[i + k] << (8u * k);
-      WR(OTG_FIFO(n), word);
-    }
+    for (uint32_t at = 0; at < size; at += 4) WR(OTG_FIFO(n), word_of(t->data + at, size - at));
     t->data += size;
     t->left = (uint16_t)(t->left - size);
   }

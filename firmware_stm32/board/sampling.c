@@ -25,7 +25,7 @@ void sampling_init(void) {
   WR(ADC_CCR, BIT(16));           /* 84 MHz / 4 = 21 MHz; at most 36 (data sheet, table 67) */
   WR(ADC_SMPR2, kSampleTime | (kSampleTime << 3) | (kSampleTime << 6) | (kSampleTime << 9));
   WR(ADC_SQR1, (SAMPLING_CHANNELS - 1u) << 20);
-  WR(ADC_SQR3, 0u | (1u << 5) | (2u << 10) | (3u << 15));
+  WR(ADC_SQR3, /* channel 0 first, then */ (1u << 5) | (2u << 10) | (3u << 15));
 }
 
 /* 10.3.17: the stream off and seen to be off, its flags cleared, then configured, then on. */

@@ -5,7 +5,8 @@
 
 #include <string.h>
 
-extern uint32_t data_load_start, data_start, data_end, bss_start, bss_end, stack_top;
+extern uint32_t data_load_start[], data_start[], data_end[], bss_start[], bss_end[],
+    stack_top[]; /* f405.ld */
 
 enum { kLoaderWanted = 0x44465521, kSystemMemory = 0x1FFF0000 };
 
@@ -56,9 +57,9 @@ void reset_handler(void) {
     loader_wish = 0;
     enter_loader();
   }
-  const uint32_t* from = &data_load_start;
-  for (uint32_t* to = &data_start; to < &data_end;) *to++ = *from++;
-  for (uint32_t* to = &bss_start; to < &bss_end;) *to++ = 0;
+  const uint32_t* from = data_load_start;
+  for (uint32_t* to = data_start; to != data_end;) *to++ = *from++;
+  for (uint32_t* to = bss_start; to != bss_end;) *to++ = 0;
   ++survived.boots;
   (void)main();
   reset();
@@ -97,15 +98,15 @@ __attribute__((naked)) void fault_handler(void) {
 /* An interrupt that nobody asked for is a fault. */
 typedef void (*vector)(void);
 __attribute__((section(".vectors"), used)) static const vector vectors[16 + 82] = {
-    [0] = (vector)&stack_top,
+    [0] = (vector)stack_top,
     [1] = reset_handler,
     [2 ... 14] = fault_handler,
     [15] = on_tick,
     [16 ... 15 + IRQ_ADC] = fault_handler,
     [16 + IRQ_ADC] = on_sampling,
-    [17 + IRQ_ADC ... 15 + IRQ_DMA2_STREAM0] = fault_handler,
+    [17 + IRQ_ADC... 15 + IRQ_DMA2_STREAM0] = fault_handler,
     [16 + IRQ_DMA2_STREAM0] = on_sampling,
-    [17 + IRQ_DMA2_STREAM0 ... 15 + IRQ_OTG_FS] = fault_handler,
+    [17 + IRQ_DMA2_STREAM0... 15 + IRQ_OTG_FS] = fault_handler,
     [16 + IRQ_OTG_FS] = on_usb,
-    [17 + IRQ_OTG_FS ... 97] = fault_handler,
+    [17 + IRQ_OTG_FS... 97] = fault_handler,
 };

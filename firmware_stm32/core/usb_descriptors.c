@@ -98,8 +98,8 @@ static const uint8_t kMsOs[kMsOsSize] = {
 
 static usb_bytes string_descriptor(const char* text, uint8_t* buffer) {
   uint8_t size = 2;
-  for (uint32_t i = 0; text[i] != 0 && i < kLongestString; ++i) {
-    buffer[size++] = (uint8_t)text[i];
+  for (; *text != 0 && size < 2 * kLongestString; ++text) {
+    buffer[size++] = (uint8_t)*text;
     buffer[size++] = 0;
   }
   buffer[0] = size;

@@ -97,14 +97,12 @@ void UsbBus::replace_node_by_gate() {
 }
 
 void UsbBus::plug() {
-  number_ = next_number();
   std::string descriptors;
   {
     const std::lock_guard lock(mutex_);
+    number_ = next_number();
     board_.enumerate();  // a kernel would have done it
     descriptors = hex_descriptors(board_);
-    pending_.clear();
-    done_.clear();
     mangled_.clear();
     mangled_used_ = 0;
     clock_s_ = now_s();
@@ -190,7 +188,7 @@ void UsbBus::show_ready(bool ready) {
 
 void UsbBus::complete(usbdevfs_urb* urb, int status) {
   urb->status = status;
-  done_.push_back(urb);
+  done_[number_].push_back(urb);
   show_ready(true);
 }
 
@@ -320,18 +318,23 @@ long UsbBus::discard(void* urb, int& error) {
   return -1;
 }
 
-long UsbBus::ioctl(unsigned long request, void* argument, bool dead, int& error) {
-  if (request == static_cast<unsigned>(USBDEVFS_REAPURBNDELAY)) {
-    if (!done_.empty()) {
-      *static_cast<void**>(argument) = done_.front();
-      done_.pop_front();
-      if (done_.empty() && !dead) show_ready(false);
-      return 0;
-    }
+long UsbBus::reap(void** urb, int number, bool dead, int& error) {
+  std::deque<usbdevfs_urb*>& done = done_[number];
+  if (done.empty()) {
     error = dead ? ENODEV : EAGAIN;
-    show_ready(dead);
+    if (!dead) show_ready(false);
     return -1;
   }
+  *urb = done.front();
+  done.pop_front();
+  if (done.empty() && !dead) show_ready(false);
+  return 0;
+}
+
+long UsbBus::ioctl(unsigned long request, void* argument, int number, int& error) {
+  const bool dead = gone_ || number != number_;
+  if (request == static_cast<unsigned>(USBDEVFS_REAPURBNDELAY))
+    return reap(static_cast<void**>(argument), number, dead, error);
   if (request == static_cast<unsigned>(USBDEVFS_GET_CAPABILITIES)) {
     *static_cast<std::uint32_t*>(argument) =
         USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
@@ -366,7 +369,7 @@ int UsbBus::on_ioctl(_UMockdevIoctlBase* /*base*/, _UMockdevIoctlClient* client,
   long result = 0;
   {
     const std::lock_guard lock(self.mutex_);
-    result = self.ioctl(request, argument, self.gone_ || number != self.number_, error);
+    result = self.ioctl(request, argument, number, error);
   }
   umockdev_ioctl_client_complete(client, result, error);
   return 1;

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -61,7 +62,8 @@ class UsbBus {
   void complete(usbdevfs_urb* urb, int status);
   void show_ready(bool ready);
   void replace_node_by_gate();
-  long ioctl(unsigned long request, void* argument, bool dead, int& error);
+  long ioctl(unsigned long request, void* argument, int number, int& error);
+  long reap(void** urb, int number, bool dead, int& error);
   long submit(usbdevfs_urb* urb);
   long discard(void* urb, int& error);
   static int on_ioctl(_UMockdevIoctlBase*, _UMockdevIoctlClient* client, void* self);
@@ -71,8 +73,9 @@ class UsbBus {
   _UMockdevIoctlBase* handler_;
   std::mutex mutex_;
   std::condition_variable wake_;
-  std::deque<usbdevfs_urb*> pending_, done_;
-  std::vector<std::uint8_t> mangled_;  // bytes on the wire that no transfer has taken yet
+  std::deque<usbdevfs_urb*> pending_;
+  std::map<int, std::deque<usbdevfs_urb*>> done_;  // by device number: one that is gone is still reaped
+  std::vector<std::uint8_t> mangled_;              // bytes on the wire that no transfer has taken yet
   std::size_t mangled_used_ = 0;
   bool mangled_end_ = false;  // a short packet stands at their end
   Mangle mangle_;
