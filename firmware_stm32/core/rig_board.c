@@ -179,6 +179,26 @@ static void send(rig_board* b) {
   b->port->unlock(b->port_context, key);
 }
 
+/* With more to come only whole USB packets are sent and the rest is carried over: a short packet would end
+ * the host's transfer, and large transfers are what a host is quick with. False where there is nothing to
+ * send. */
+static bool fill_transfer(rig_board* b) {
+  uint16_t size = b->carried, more;
+  memcpy(b->transfer, b->carry, size);
+  do {
+    more = board_next_packet(b, b->transfer + size);
+    size = (uint16_t)(size + more);
+  } while (more > 0 && size + TRW_MAX_PACKET <= BOARD_TRANSFER);
+  /* Where the last transfer ended on a full packet, and nothing follows, the host still waits for its end. */
+  if (size == 0 && !b->flush) return false;
+  bool backlog = more > 0 && ring_count(&b->ring) >= b->packet_frames;
+  b->carried = backlog ? (uint16_t)(size % USB_PACKET) : 0u;
+  b->transfer_size = (uint16_t)(size - b->carried);
+  memcpy(b->carry, b->transfer + b->transfer_size, b->carried);
+  b->flush = b->transfer_size > 0 && b->transfer_size % USB_PACKET == 0;
+  return true;
+}
+
 void board_poll(rig_board* b) {
   uint32_t key = b->port->lock(b->port_context);
   bool ready = b->usb.configuration != 0 && !b->usb.halted && !b->in_flight;
@@ -188,17 +208,7 @@ void board_poll(rig_board* b) {
     drop_unwanted(b);
     return;
   }
-  if (!again) {
-    uint16_t size = 0, more;
-    do {
-      more = board_next_packet(b, b->transfer + size);
-      size = (uint16_t)(size + more);
-    } while (more > 0 && size + TRW_MAX_PACKET <= BOARD_TRANSFER);
-    /* Where the last transfer ended on a full packet the host still waits for its end. */
-    if (size == 0 && !b->flush) return;
-    b->transfer_size = size;
-    b->flush = size > 0 && size % USB_PACKET == 0;
-  }
+  if (!again && !fill_transfer(b)) return;
   send(b);
 }
 

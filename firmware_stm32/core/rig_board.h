@@ -17,7 +17,7 @@ extern "C" {
 
 enum {
   BOARD_RING_FRAMES = 4096, /* 64 KiB, 3.07 s at 4000/3 Hz */
-  BOARD_TRANSFER = 2048,    /* bytes of whole packets sent in one go */
+  BOARD_TRANSFER = 4096,    /* bytes sent in one go */
   BOARD_PACKET_FRAMES = 16, /* per packet when the host keeps up, fewer at low rates */
   BOARD_PACKET_MS = 12      /* and not older than this */
 };
@@ -59,6 +59,8 @@ typedef struct {
   uint64_t sent_sequence; /* of the last packet, to widen the ring's 32 bits */
   uint8_t transfer[BOARD_TRANSFER];
   uint16_t transfer_size;
+  uint8_t carry[USB_PACKET]; /* bytes that the next transfer begins with */
+  uint16_t carried;
   bool in_flight; /* guarded: the controller holds `transfer` */
   bool unsent;    /* guarded: it was dropped before it was sent */
   bool drop;      /* guarded: frames up to drop_head are not wanted any more */
