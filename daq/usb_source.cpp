@@ -36,12 +36,14 @@ class UsbSource : public PacketSource {
 
   /// What the board sampled while nobody recorded is no part of the run.
   void begin_run() override {
+    rest_.clear();
     if (!stream_ || !board_->stop()) return;
     stream_->discard(kQuiet);
     board_->start(settings_.pattern);
   }
 
   ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds timeout) override {
+    if (!rest_.empty()) return read_rest(buffer);
     if (!stream_) return {ReadResult::Status::kBroken, 0, steady_seconds()};
     const UsbStream::Got got = stream_->read(buffer, timeout);
     if (got.status == UsbStream::Status::kData) {
@@ -62,12 +64,25 @@ class UsbSource : public PacketSource {
   }
 
  private:
+  ReadResult read_rest(std::span<std::byte> buffer) {
+    const std::size_t size = std::min(buffer.size(), rest_.size());
+    std::copy_n(rest_.begin(), size, buffer.begin());
+    rest_.erase(rest_.begin(), rest_.begin() + static_cast<std::ptrdiff_t>(size));
+    return {ReadResult::Status::kData, size, steady_seconds()};
+  }
+
   ReadResult broken(const char* cause) {
     broken_ = true;
     return {ReadResult::Status::kBroken, 0, steady_seconds(), cause};
   }
 
+  /// What has come is kept for the next read: a source that is reopened because nothing came may just have
+  /// got something.
   void close() {
+    if (stream_) {
+      const std::vector<std::byte> rest = stream_->finish();
+      rest_.insert(rest_.end(), rest.begin(), rest.end());
+    }
     stream_.reset();
     board_.reset();
   }
@@ -126,6 +141,7 @@ class UsbSource : public PacketSource {
   std::shared_ptr<UsbBus> bus_;
   std::unique_ptr<UsbBoard> board_;
   std::unique_ptr<UsbStream> stream_;
+  std::vector<std::byte> rest_;  // of streams that were closed
   std::uint32_t boot_id_ = 0;
   std::chrono::milliseconds silent_{0}, silence_limit_{0};
   bool broken_ = false;

@@ -212,6 +212,16 @@ UsbStream::Got UsbStream::read(std::span<std::byte> buffer, std::chrono::millise
   return got;
 }
 
+std::vector<std::byte> UsbStream::finish() {
+  stop();
+  const std::lock_guard lock(state_->mutex);
+  std::vector<std::byte> rest;
+  for (const State::Chunk& chunk : state_->chunks)
+    rest.insert(rest.end(), chunk.bytes.begin() + static_cast<std::ptrdiff_t>(chunk.used), chunk.bytes.end());
+  state_->chunks.clear();
+  return rest;
+}
+
 void UsbStream::discard(std::chrono::milliseconds quiet) {
   std::unique_lock lock(state_->mutex);
   for (int round = 0; round < 10; ++round) {

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <vector>
 
 namespace tunnelrig {
 
@@ -37,6 +38,9 @@ class UsbStream {
   /// Waits for bytes, at most for `timeout` (and where the endpoint has to be cleared of a stall, 0.5 s
   /// more).
   Got read(std::span<std::byte> buffer, std::chrono::milliseconds timeout);
+
+  /// Ends the stream; what has come and was not read. Waits at most for the settings' drain_wait.
+  std::vector<std::byte> finish();
 
   /// Throws away what has come so far, until nothing came for `quiet`; back within 10 × `quiet`.
   void discard(std::chrono::milliseconds quiet);
