@@ -58,6 +58,7 @@ void board_stop(rig_board* b) {
   if (!b->running) return;
   b->port->stop_sampling(b->port_context);
   b->running = false;
+  ++b->stops;
   b->drop = true; /* the ring's consumer is the main loop, which does it */
   b->drop_head = ring_head(&b->ring);
 }
@@ -183,6 +184,7 @@ static void send(rig_board* b) {
  * the host's transfer, and large transfers are what a host is quick with. False where there is nothing to
  * send. */
 static bool fill_transfer(rig_board* b) {
+  b->transfer_stops = b->stops;
   uint16_t size = b->carried, more;
   memcpy(b->transfer, b->carry, size);
   do {
@@ -202,12 +204,15 @@ static bool fill_transfer(rig_board* b) {
 void board_poll(rig_board* b) {
   uint32_t key = b->port->lock(b->port_context);
   bool ready = b->usb.configuration != 0 && !b->usb.halted && !b->in_flight;
+  bool stale = b->transfer_stops != b->stops;
+  if (stale) b->unsent = false;
   bool again = b->unsent;
   b->port->unlock(b->port_context, key);
   if (!ready) {
     drop_unwanted(b);
     return;
   }
+  if (stale) b->carried = 0;
   if (!again && !fill_transfer(b)) return;
   send(b);
 }

@@ -43,6 +43,7 @@ typedef struct {
   uint32_t highest_rate_hz; /* of frames: what the stream carries */
   uint32_t packet_frames;
   bool running, pattern;
+  uint32_t stops; /* how often it was stopped */
 
   /* the sampling interrupt's own */
   uint64_t sequence;        /* of the next frame */
@@ -61,10 +62,11 @@ typedef struct {
   uint16_t transfer_size;
   uint8_t carry[USB_PACKET]; /* bytes that the next transfer begins with */
   uint16_t carried;
-  bool in_flight; /* guarded: the controller holds `transfer` */
-  bool unsent;    /* guarded: it was dropped before it was sent */
-  bool drop;      /* guarded: frames up to drop_head are not wanted any more */
-  bool flush;     /* the last transfer ended on a full packet: an empty one must follow before a pause */
+  uint32_t transfer_stops; /* `stops` when it was filled: what a stop has overtaken is not sent again */
+  bool in_flight;          /* guarded: the controller holds `transfer` */
+  bool unsent;             /* guarded: it was dropped before it was sent */
+  bool drop;               /* guarded: frames up to drop_head are not wanted any more */
+  bool flush; /* the last transfer ended on a full packet: an empty one must follow before a pause */
   uint32_t drop_head;
   uint32_t transfers;
 

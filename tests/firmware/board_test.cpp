@@ -200,6 +200,25 @@ TEST(FirmwareBoard, StopDropsWhatWasNotSentAndNumbersGoOn) {
   EXPECT_EQ(host.wrong, 0u);
 }
 
+TEST(FirmwareBoard, WhatAStopHasOvertakenIsNotSentAgain) {
+  Board board;
+  Host host(board);
+  board.enumerate();
+  vendor_out(board, TRW_USB_START);
+  board.advance(1000);
+  board.poll();  // frames 0 … are on their way
+  std::array<std::uint8_t, 64> packet{};
+  EXPECT_EQ(board.controller.in_packet(packet.data(), packet.size()), 64);
+  board.control(0x02, 3, 0, 0x81, 0, nullptr);
+  vendor_out(board, TRW_USB_STOP);
+  vendor_out(board, TRW_USB_START);
+  board.control(0x02, 1, 0, 0x81, 0, nullptr);
+  board.advance(160);
+  host.drain();
+  EXPECT_EQ(host.tracker.ledger().first_sequence, 1000u);
+  EXPECT_EQ(host.tracker.ledger().frames_lost, 0u);
+}
+
 TEST(FirmwareBoard, ConverterErrorsAreTimeThatIsMissing) {
   Board board;
   Host host(board);

@@ -19,10 +19,10 @@ std::int16_t sample_of(std::uint64_t sequence, std::size_t c) {
 const board_port& Board::port() {
   static const board_port functions = {
       .start_sampling =
-          [](void* context, std::uint32_t ticks_per_scan, std::uint32_t scans_per_frame) {
+          [](void* context, std::uint32_t ticks, std::uint32_t scans) {
             ++self(context).starts;
-            self(context).ticks_per_scan = ticks_per_scan;
-            self(context).scans_per_frame = scans_per_frame;
+            self(context).ticks_per_scan = ticks;
+            self(context).scans_per_frame = scans;
           },
       .stop_sampling = [](void*) {},
       .ticks = [](void* context) { return self(context).ticks_; },
