@@ -6,10 +6,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <stdexcept>
 
 #include <fcntl.h>
 #include <linux/usbdevice_fs.h>
+#include <pthread.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <umockdev.h>
@@ -38,6 +40,12 @@ double now_s() {
 
 void require(bool good, GError* error) {
   if (!good) throw std::runtime_error(error != nullptr ? error->message : "umockdev failed");
+}
+
+double seconds_of(clockid_t clock) {
+  timespec used{};
+  ::clock_gettime(clock, &used);
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
 }
 
 std::string hex_descriptors(Board& board) {
@@ -169,6 +177,13 @@ void UsbBus::set_mangle(Mangle mangle) {
 void UsbBus::with_board(const std::function<void(Board&)>& look) {
   const std::lock_guard lock(mutex_);
   look(board_);
+}
+
+double UsbBus::processor_s() {
+  clockid_t clock{};
+  ::pthread_getcpuclockid(worker_.native_handle(), &clock);
+  const std::lock_guard lock(mutex_);
+  return seconds_of(clock) + ioctl_processor_s_;
 }
 
 // --- everything below with the lock held, but for work() and on_ioctl()
@@ -371,6 +386,7 @@ int UsbBus::on_ioctl(_UMockdevIoctlBase* /*base*/, _UMockdevIoctlClient* client,
   {
     const std::lock_guard lock(self.mutex_);
     result = self.ioctl(request, argument, number, error);
+    self.ioctl_processor_s_ = seconds_of(CLOCK_THREAD_CPUTIME_ID);
   }
   umockdev_ioctl_client_complete(client, result, error);
   return 1;
@@ -379,8 +395,10 @@ int UsbBus::on_ioctl(_UMockdevIoctlBase* /*base*/, _UMockdevIoctlClient* client,
 }  // namespace tunnelrig::simulated
 
 #ifdef __SANITIZE_THREAD__
-// What a kernel would do, ThreadSanitizer does not see as handing memory over: it comes by umockdev's own ways. Races
-// between the logger's threads are still found.
+// What a kernel would do, ThreadSanitizer does not see as handing memory over: it comes by umockdev's own
+// ways. Races between the logger's threads are still found.
 extern "C" const char* __tsan_default_suppressions();
-extern "C" const char* __tsan_default_suppressions() { return "race:tunnelrig::simulated::UsbBus\nrace:libumockdev.so\n"; }
+extern "C" const char* __tsan_default_suppressions() {
+  return "race:tunnelrig::simulated::UsbBus\nrace:libumockdev.so\n";
+}
 #endif

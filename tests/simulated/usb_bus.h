@@ -51,6 +51,9 @@ class UsbBus {
 
   void set_mangle(Mangle mangle);
 
+  /// Processor time so far of the board's thread and of umockdev's, which answers the ioctls.
+  double processor_s();
+
   /// The board may be looked at, or made to stumble, under this lock only.
   void with_board(const std::function<void(Board&)>& look);
 
@@ -84,6 +87,7 @@ class UsbBus {
   bool gate_full_ = false;
   int number_;
   double clock_s_ = 0;
+  double ioctl_processor_s_ = 0;
   std::string node_;
   std::thread worker_;
 };
