@@ -1,4 +1,4 @@
-/* Eight conversions to one: an equiripple-like Kaiser low-pass of 96 taps per channel, then every eighth
+/* Eight conversions to one: a Kaiser-windowed low-pass of 96 taps per channel, then every eighth
  * output.
  *
  * At 10666.7 conversions/s: flat within 0.01 dB to 460 Hz, -6 dB at 666.7 Hz, below -57 dB from 867 Hz on;
@@ -21,8 +21,8 @@ typedef struct {
   bool primed;
 } decimator;
 
-/* Symmetric, in units of 2^-15, sum 32768: the first half. */
-extern const int16_t decimator_taps[DECIMATOR_TAPS / 2];
+/* Symmetric, in units of 2^-15, sum 32768. */
+extern const int16_t decimator_taps[DECIMATOR_TAPS];
 
 void decimator_reset(decimator* filter);
 
