@@ -1,11 +1,12 @@
-"""cycles.py IMAGE.elf: upper bounds of what the firmware's work costs, counted in the disassembly.
+"""cycles.py IMAGE.elf [--recursion]: upper bounds of what the firmware's work costs, counted in the disassembly.
 
 Every instruction of a function counts, both sides of every branch, times the bounds of the loops that it stands in; calls
 add their callee. Costs are those of the Cortex-M4 (ARM DDI 0439, table 3-1) with the most for a taken branch. Flash has 5
 wait states and in front of it the ART accelerator, 1 KiB, which holds each of our loops: a jump pays for a refill once in
 each call of its function, not in every turn of a loop. Bounds cannot be read off the code: they stand below, for the backward
 jumps of a function in the order of addresses (what is not named is layout, not a loop). Where the number of these jumps is
-another one than here, this program fails, and somebody has to look again."""
+another one than here, this program fails, and somebody has to look again. With --recursion it only says whether any
+function of ours can call itself."""
 
 import re
 import subprocess
@@ -106,8 +107,35 @@ class Counter:
         return total
 
 
+def recursive(found):
+    """Functions from which direct calls lead back to themselves. (Calls through the tables of controller, port and application
+    go downwards only: a controller's function calls nobody.)"""
+    calls = {name: set() for name in found}
+    for name, code in found.items():
+        for _, mnemonic, operands in code:
+            callee = re.search(r"<([^+>]+)>", operands)
+            jump_to_own_start = callee and callee[1] == name and not mnemonic.startswith("bl")
+            if mnemonic.startswith("b") and callee and callee[1] in found and not jump_to_own_start:
+                calls[name].add(callee[1])
+
+    def reachable(start):
+        seen, todo = set(), list(calls[start])
+        while todo:
+            name = todo.pop()
+            if name not in seen:
+                seen.add(name)
+                todo += calls[name]
+        return seen
+
+    return [name for name in found if name in reachable(name)]
+
+
 def main():
     counter = Counter(functions(sys.argv[1]))
+    if "--recursion" in sys.argv:
+        found = recursive(counter.found)
+        print("recursion:", ", ".join(found) or "none")
+        raise SystemExit(1 if found else 0)
 
     def sampling(conversions, priming=0, skip=frozenset()):
         return counter.count("on_sampling", bounds(conversions, priming), ERROR_PATH | skip) + EXCEPTION

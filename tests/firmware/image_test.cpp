@@ -77,6 +77,13 @@ TEST(Image, VectorsPointIntoTheImageAndTheStackHasNothingBelowIt) {
   }
 }
 
+TEST(Image, NoFunctionCallsItself) {
+  SKIP_WITHOUT_IMAGE();
+  const std::string command = "/usr/bin/python3 '" TUNNELRIG_FIRMWARE_SOURCE "/cycles.py' '" +
+                              (kImages / "tunnelrig-f405.elf").string() + "' --recursion";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+}
+
 TEST(Image, DfuFileIsWhole) {
   SKIP_WITHOUT_IMAGE();
   const auto dfu = bytes_of(kImages / "tunnelrig-f405.dfu"), image = bytes_of(kImages / "tunnelrig-f405.bin");

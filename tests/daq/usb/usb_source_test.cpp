@@ -101,7 +101,7 @@ TEST(Usb, RecordsTheRigInRealTimeAndRunsFollowEachOther) {
   for (int run = 0; run < 2; ++run) {
     const auto started = std::chrono::steady_clock::now();
     const Logged logged = log_usb(*source, 0.6);
-    EXPECT_NEAR(since(started), 0.6, 0.25) << "frames from before the run would end it early";
+    EXPECT_GT(since(started), 0.5) << "frames from before the run would end it early";
     EXPECT_EQ(logged.outcome.ledger.frames_lost, 0u);
     EXPECT_EQ(logged.outcome.ledger.silences, 0u);
     expect_every_frame_in_its_place(logged);
