@@ -57,8 +57,10 @@ class UsbSource : public PacketSource {
     return {ReadResult::Status::kNothing, 0, got.time_s};
   }
 
+  /// Only a broken stream is reopened: whether it is silent, the source's own watchdog knows, and to close
+  /// one that has just come back would cut off what it is sending.
   bool reopen() override {
-    close();
+    if (stream_ && !broken_) return true;
     std::string why;
     return open(why);
   }
