@@ -105,7 +105,7 @@ int free_port() {
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   socklen_t length = sizeof address;
-  ::bind(probe, reinterpret_cast<sockaddr*>(&address), length);
+  EXPECT_EQ(::bind(probe, reinterpret_cast<sockaddr*>(&address), length), 0);
   ::getsockname(probe, reinterpret_cast<sockaddr*>(&address), &length);
   ::close(probe);
   return ntohs(address.sin_port);
@@ -118,8 +118,9 @@ class Emulator {
     process_ = ::fork();
     if (process_ != 0) return;
     const std::string serial = "tcp:127.0.0.1:" + std::to_string(port_) + ",server=on,wait=on";
-    std::freopen("/dev/null", "w", stdout);
-    std::freopen("/dev/null", "w", stderr);
+    if (std::freopen("/dev/null", "w", stdout) == nullptr ||
+        std::freopen("/dev/null", "w", stderr) == nullptr)
+      ::_exit(126);
     ::execlp("qemu-system-arm", "qemu-system-arm", "-M", "netduinoplus2", "-kernel", image.c_str(),
              "-display", "none", "-monitor", "none", "-serial", serial.c_str(), "-icount",
              "shift=6,sleep=off", nullptr);

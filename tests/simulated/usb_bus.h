@@ -16,8 +16,8 @@
 #include <vector>
 
 struct usbdevfs_urb;
-struct _UMockdevIoctlBase;
-struct _UMockdevIoctlClient;
+struct _UMockdevIoctlBase;    // NOLINT(bugprone-reserved-identifier): umockdev's own names
+struct _UMockdevIoctlClient;  // NOLINT(bugprone-reserved-identifier)
 
 namespace tunnelrig::simulated {
 
