@@ -20,5 +20,6 @@ void add_map(CLI::App& app, Work& run);
 void add_report(CLI::App& app, Work& run);
 void add_explain(CLI::App& app, Work& run);
 void add_doctor(CLI::App& app, Work& run);
+void add_devices(CLI::App& app, Work& run);
 
 }  // namespace tunnelrig::cli
