@@ -164,12 +164,6 @@ void set_belonging(const Source& source, Observations& result) {
     result.name.push_back(fmt::format("{}:{}", source.table.sheet.file, source.row(r).line));
   }
   set_blocks(source, result);
-  std::map<int, std::set<int>> blocks_of_group;
-  for (std::size_t r = 0; r < result.group.size(); ++r)
-    blocks_of_group[result.group[r]].insert(result.block[r]);
-  result.groups_within_blocks = result.groups() > 1 && !result.blocks_are_rows &&
-                                std::all_of(blocks_of_group.begin(), blocks_of_group.end(),
-                                            [](const auto& g) { return g.second.size() == 1; });
   result.in_tunnel.assign(result.group.size(), false);
   result.previous.assign(result.group.size(), -1);
 }
@@ -209,6 +203,17 @@ void set_hold_out(const Source& source, Observations& result) {
   if (std::none_of(result.held_out.begin(), result.held_out.end(), [](bool held) { return held; }) ||
       std::all_of(result.held_out.begin(), result.held_out.end(), [](bool held) { return held; }))
     throw InputError::in("table.toml", "hold_out = \"{}\" takes all rows or none", text);
+}
+
+/// Whether each group that the fit can see lies within one block.
+void set_groups_within_blocks(Observations& result) {
+  std::map<int, std::set<int>> blocks_of_group;
+  for (std::size_t r = 0; r < result.group.size(); ++r)
+    if (result.held_out.empty() || !result.held_out[r])
+      blocks_of_group[result.group[r]].insert(result.block[r]);
+  result.groups_within_blocks = result.groups() > 1 && !result.blocks_are_rows &&
+                                std::all_of(blocks_of_group.begin(), blocks_of_group.end(),
+                                            [](const auto& g) { return g.second.size() == 1; });
 }
 
 /// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
@@ -257,6 +262,7 @@ Observations observe_table(const ObservationTable& table, const ObservationChoic
   add_covariates(source, result);
   set_baseline(source, choice, result);
   set_hold_out(source, result);
+  set_groups_within_blocks(result);
   result.duration_s = VectorXd::Zero(source.count());
   result.newtons_per_volt = VectorXd::Ones(1);
   result.rig.rotors = 1;
