@@ -279,6 +279,21 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
   return result;
 }
 
+/// Conditions that never changed, and so keep an effect from being tested.
+void warn_of_constant(const Observations& observations, Explanation& explanation) {
+  std::set<std::string> constant;
+  for (const Untestable& entry : explanation.untestable)
+    for (const Effect& effect : all_effects())
+      for (const std::string& name : effect.covariates) {
+        const Covariate* covariate = observations.find(name);
+        if (entry.effect == effect.name && entry.missing.empty() && covariate != nullptr &&
+            !covariate->derived && covariate->value.maxCoeff() == covariate->value.minCoeff())
+          constant.insert(name);
+      }
+  for (const std::string& name : constant)
+    explanation.warnings.push_back(name + " is the same in every run: nothing can be found that follows it");
+}
+
 /// Pairs of covariates that no campaign of this design can tell apart.
 void warn_of_collinear(const Observations& observations, Explanation& explanation) {
   for (std::size_t a = 0; a < observations.covariates.size(); ++a)
@@ -417,6 +432,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
     explanation.warnings.push_back(covariate + " is " + why);
   const std::vector<int> rows = all_rows(observations);
   explanation.untestable = untestable_effects(observations, effects, rows);
+  warn_of_constant(observations, explanation);
   warn_of_collinear(observations, explanation);
   if (observations.blocks() < kFewestBlocks) {
     explain_too_few(observations, explanation);

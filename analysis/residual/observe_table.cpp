@@ -166,12 +166,6 @@ void set_belonging(const Source& source, Observations& result) {
     result.name.push_back(fmt::format("{}:{}", source.table.sheet.file, source.row(r).line));
   }
   set_blocks(source, result);
-  std::map<int, std::set<int>> blocks_of_group;
-  for (std::size_t r = 0; r < result.group.size(); ++r)
-    blocks_of_group[result.group[r]].insert(result.block[r]);
-  result.groups_within_blocks = result.groups() > 1 && !result.blocks_are_rows &&
-                                std::all_of(blocks_of_group.begin(), blocks_of_group.end(),
-                                            [](const auto& g) { return g.second.size() == 1; });
   result.in_tunnel.assign(result.group.size(), false);
   result.previous.assign(result.group.size(), -1);
 }
@@ -223,6 +217,17 @@ void set_other_axes(const TableSchema& schema, const std::string& baseline, Obse
       result.other_axes.push_back(column.meaning.empty() ? column.column : column.meaning);
 }
 
+/// Whether each group that the fit can see lies within one block.
+void set_groups_within_blocks(Observations& result) {
+  std::map<int, std::set<int>> blocks_of_group;
+  for (std::size_t r = 0; r < result.group.size(); ++r)
+    if (result.held_out.empty() || !result.held_out[r])
+      blocks_of_group[result.group[r]].insert(result.block[r]);
+  result.groups_within_blocks = result.groups() > 1 && !result.blocks_are_rows &&
+                                std::all_of(blocks_of_group.begin(), blocks_of_group.end(),
+                                            [](const auto& g) { return g.second.size() == 1; });
+}
+
 /// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
 void set_baseline(const Source& source, const ObservationChoice& choice, Observations& result) {
   result.baseline = choice.baseline.empty() ? "constant" : choice.baseline;
@@ -270,6 +275,7 @@ Observations observe_table(const ObservationTable& table, const ObservationChoic
   add_covariates(source, result);
   set_baseline(source, choice, result);
   set_hold_out(source, result);
+  set_groups_within_blocks(result);
   result.duration_s = VectorXd::Zero(source.count());
   result.newtons_per_volt = VectorXd::Ones(1);
   result.rig.rotors = 1;
