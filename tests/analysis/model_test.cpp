@@ -81,7 +81,7 @@ TEST(ApplyModel, ReadingsAreLedBackThroughEveryTerm) {
       corrected(data, model_of({term("creep", {c, tau}, {100}), term("crosstalk", {x}, {}, 0, 1)}));
   ASSERT_EQ(reduction.runs.size(), 4u);
   for (const RunCoefficients& run : reduction.runs) {
-    const Run& given = data.runs[run.run];
+    const tunnelrig::Run& given = data.runs[run.run];
     const double creep = 1 + c * (1 - std::exp(-*given.number("time_since_motor_start_s") / tau));
     const auto& force = run.thrust_N;
     EXPECT_NEAR(force[0] * creep * (1 + x * force[1] / force[0]), *given.thrust_N[0], 1e-10 * 8);
@@ -116,7 +116,7 @@ TEST(ApplyModel, ARunWithoutTheCovariateIsLeftOutWithTheReason) {
   EXPECT_TRUE(reduction.left_out[0].problem);
   EXPECT_THAT(reduction.left_out[0].reason,
               HasSubstr("no air_pressure_Pa, which the adopted effect air_pressure"));
-  for (Run& run : data.runs) run.numbers.erase("air_pressure_Pa");
+  for (tunnelrig::Run& run : data.runs) run.numbers.erase("air_pressure_Pa");
   EXPECT_THAT(message_of([&] { corrected(data, model_of({term("air_pressure", {1}, {100000})})); }),
               HasSubstr("no run can be reduced by model version 1 (air_pressure)"));
 }
@@ -188,6 +188,20 @@ TEST(ModelVersion, BrokenDocumentsAreRefusedByName) {
   EXPECT_THAT(refusal("\"parent\": 0", "\"parent\": 1"), HasSubstr("builds on version 1"));
   EXPECT_THAT(refusal("{", "["), HasSubstr("is no JSON"));
   EXPECT_THAT(message_of([] { model_from_json("[]", "x"); }), HasSubstr("x is no object"));
+}
+
+TEST(ModelVersion, AnyDamageIsAnswered) {
+  const std::string good = model_json(model_of({term("creep", {0.01, 100}, {90})}));
+  int refused = 0;
+  for (std::size_t at = 0; at < good.size(); ++at) {
+    for (const char byte : {'}', '0', '"', '\xff'}) {
+      std::string text = good;
+      text[at] = byte;
+      refused += message_of([&] { model_from_json(text, "m"); }) == "no InputError was thrown" ? 0 : 1;
+    }
+    message_of([&] { model_from_json(good.substr(0, at), "m"); });
+  }
+  EXPECT_GT(refused, static_cast<int>(good.size()));
 }
 
 TEST(Adopt, OnlyThrustsOfACampaign) {
