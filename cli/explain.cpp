@@ -1,5 +1,7 @@
 // tunnelrig explain: find the residual, trace it to the effect that the model lacks, add it, report before
 // and after.
+#include "analysis/model/adopt.h"
+#include "analysis/model/model_store.h"
 #include "analysis/residual/explanation_output.h"
 #include "cli/console.h"
 #include "cli/verb.h"
@@ -17,7 +19,7 @@ namespace {
 struct Options {
   std::string db, response, baseline, json, html;
   SearchSettings search;
-  bool list = false, adopt = false;
+  bool list = false, adopt = false, adopt_empirical = false;
 };
 
 std::vector<const Effect*> candidates() {
@@ -44,6 +46,24 @@ int list(const Options& options) {
   return kWell;
 }
 
+/// Stores what was accepted as the next version of the model, and says so.
+void adopt_and_store(const Options& options, const Observations& observations,
+                     const Explanation& explanation) {
+  Adoption adoption = adopt(observations, explanation, options.adopt_empirical);
+  for (const std::string& note : adoption.notes) warn(note);
+  if (!adoption.model) {
+    fmt::print(stderr, "nothing was adopted: the model stays as it is\n");
+    return;
+  }
+  CampaignFile file(options.db, CampaignFile::Access::kWrite);
+  const auto certificate = file.newest_document("calibration");
+  const nlohmann::json inputs{{"calibration", certificate ? certificate->id : 0}};
+  adoption.model->version =
+      store_model(file, *adoption.model, {program_version(), arguments(), inputs.dump()});
+  fmt::print(stderr, "stored as model {}; reduce, map and report go by it from now on\n",
+             adoption.model->name());
+}
+
 int run(Options options) {
   if (options.list) return list(options);
   if (options.db.empty()) throw InputError("--db is required (all but --list need a campaign)");
@@ -51,6 +71,8 @@ int run(Options options) {
   const std::vector<Effect> axes = effects_of_other_axes(observations);
   std::vector<const Effect*> effects = candidates();
   for (const Effect& axis : axes) effects.push_back(&axis);
+  const bool adopting = options.adopt || options.adopt_empirical;
+  if (adopting) require_adoptable(observations);
   ProgressBar progress("explaining");
   double step = 0;
   options.search.progress = [&](const std::string& what) {
@@ -65,6 +87,7 @@ int run(Options options) {
   else
     fmt::print("{}", explanation_text(explanation));
   if (!options.json.empty() && options.json != "-") write_text(options.json, json + "\n");
+  if (adopting) adopt_and_store(options, observations, explanation);
   return kWell;
 }
 
@@ -98,6 +121,8 @@ void add_explain(CLI::App& app, Work& work) {
   verb->add_flag("--list", options->list,
                  "Print the candidates, and with --db whether this data can test them");
   verb->add_flag("--adopt", options->adopt, "Store the accepted effects as the next version of the model");
+  verb->add_flag("--adopt-empirical", options->adopt_empirical,
+                 "Store with them the curves that have no name");
   verb->callback([options, &work] { work = [options] { return run(*options); }; });
 }
 

@@ -89,6 +89,9 @@ inline constexpr int kShapes = 6;
 /// without variation.
 Observations observe_campaign(const CampaignData& data, const ObservationChoice& choice);
 
+/// The same whether or not the response varies: what is known of the runs, which a model corrects them by.
+Observations observe_runs(const CampaignData& data, const ObservationChoice& choice);
+
 /// All rows. Throws InputError likewise.
 Observations observe_table(const ObservationTable& table, const ObservationChoice& choice);
 

@@ -32,7 +32,7 @@ struct ReportTest : testing::Test {
                               .program_version = "0",
                               .arguments = "tunnelrig report",
                               .created_utc = "2026-03-02T08:00:00Z",
-                              .terms = terms});
+                              .model = {terms, {}}});
   }
   Json json(const CampaignParts& parts) const {
     make_campaign(db, parts);
