@@ -257,8 +257,20 @@ def main():
         chosen.flush()
         scorer = build / "tests" / "attribution" / "score_attribution"
         code = subprocess.run([scorer, chosen.name, *options.score], check=False).returncode
+        if options.smoke:  # three campaigns a cell say nothing of a target, but all of a crash or a broken contract
+            code = broken(json.loads(subprocess.run([scorer, chosen.name, "--json"], check=False,
+                                                    capture_output=True, text=True).stdout))
     print_cost(results, names)
     return code
+
+
+def broken(scores):
+    """1 where `explain` failed or broke its contract."""
+    if isinstance(scores, dict):
+        if scores.get("metric", scores.get("name")) in ("explain failed", "contract broken"):
+            return int(scores["value"] != 0)
+        return max((broken(value) for value in scores.values()), default=0)
+    return max((broken(value) for value in scores), default=0) if isinstance(scores, list) else 0
 
 
 if __name__ == "__main__":
