@@ -131,12 +131,15 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
   return result;
 }
 
+}  // namespace
+
 std::string unit_of(const Observations& observations, const EffectParameter& parameter) {
-  // Without a calibration there are no volts: what would be volts is in the response's unit.
   const bool volts = parameter.unit == "V" || parameter.unit.starts_with("V/");
   if (!volts || (observations.newtons_per_volt.array() != 1).any()) return parameter.unit;
   return observations.unit + parameter.unit.substr(1);
 }
+
+namespace {
 
 // --- curves
 // ------------------------------------------------------------------------------------------------------------
