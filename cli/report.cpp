@@ -4,7 +4,6 @@
 #include "cli/verb.h"
 #include "datasets/csv.h"
 
-#include <chrono>
 #include <memory>
 
 #include <fmt/format.h>
@@ -15,11 +14,6 @@ namespace {
 struct Options {
   std::string db, out, model, terms;
 };
-
-std::string now_utc() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return format_utc(static_cast<double>(std::chrono::duration_cast<std::chrono::seconds>(now).count()));
-}
 
 int run(const Options& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);

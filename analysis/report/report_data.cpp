@@ -109,6 +109,8 @@ ReportData report_data(const CampaignFile& file, const ReportSettings& settings,
                   {"model", settings.model.name()}}}};
   document.update(file.text("table.toml") ? table_document(file)
                                           : campaign_document(gather(file, settings, progress)));
+  if (Json models = report::model_section(file); !models.empty())
+    document["sections"]["model"] = std::move(models);
   ReportData data;
   for (const auto& [name, section] : document["sections"].items()) {
     if (section.contains("absent")) data.absent.push_back({name, section["absent"].get<std::string>()});

@@ -177,6 +177,7 @@ class Search {
     NullMaxima maxima(*scan.scan, fit_.variances, settings_, ++salt_);
     const double p = maxima.p(scan.fits[scan.order[0]].evidence);
     if (p <= settings_.alpha || critical_ == 0) critical_ = maxima.critical();
+    round.observed = scan.fits[scan.order[0]].evidence;
     round.critical = critical_;
     round.ranking = ranking(scan, maxima);
     round.null_maxima = maxima.values();
@@ -380,6 +381,7 @@ class Search {
     const std::size_t best = scan.order[0];
     const double p = maxima.p(scan.fits[best].evidence);
     Round round;
+    round.observed = scan.fits[best].evidence;
     round.null_maxima = maxima.values();
     round.outcome = fmt::format("p = {:.3g} for {}", p, curves_[tried[best]].label());
     result_.curve_rounds.push_back(std::move(round));

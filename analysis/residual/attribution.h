@@ -33,6 +33,7 @@ struct Ranked {
 struct Round {
   std::vector<Ranked> ranking;      // best way of each effect, best first
   std::vector<double> null_maxima;  // what the largest evidence is where there is no effect
+  double observed = 0;              // the largest evidence of the data
   double critical = 0;              // evidence that α asks for
   std::string outcome;              // in words: what was accepted, or why not
 };

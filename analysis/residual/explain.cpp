@@ -158,12 +158,15 @@ ParameterEstimate estimate_over_groups(const Observations& observations, const T
   return {parameter.name, parameter.unit, quantile(0.5), quantile(0.5 - half), quantile(0.5 + half), false};
 }
 
+}  // namespace
+
 std::string unit_of(const Observations& observations, const EffectParameter& parameter) {
-  // Without a calibration there are no volts: what would be volts is in the response's unit.
   const bool volts = parameter.unit == "V" || parameter.unit.starts_with("V/");
   if (!volts || (observations.newtons_per_volt.array() != 1).any()) return parameter.unit;
   return observations.unit + parameter.unit.substr(1);
 }
+
+namespace {
 
 // --- curves
 // ------------------------------------------------------------------------------------------------------------
