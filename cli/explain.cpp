@@ -88,9 +88,8 @@ int run(Options options) {
     fmt::print("{}", explanation_text(explanation));
   if (!options.json.empty() && options.json != "-") write_text(options.json, json + "\n");
   if (!options.html.empty())
-    write_text(options.html,
-               explanation_html(explanation, observations, options.search,
-                                {options.db, program_version(), arguments(), now_utc()}));
+    write_text(options.html, explanation_html(explanation, observations, options.search,
+                                              {options.db, program_version(), arguments(), now_utc()}));
   if (adopting) adopt_and_store(options, observations, explanation);
   return kWell;
 }

@@ -26,10 +26,7 @@ std::string escaped(std::string_view json) {
 std::string render(std::string_view json, std::string_view script) {
   const std::string data = escaped(json);
   const std::array<std::pair<std::string_view, std::string_view>, 4> parts = {
-      {{"style", report::page_style()},
-       {"plotly", report::plotly()},
-       {"data", data},
-       {"script", script}}};
+      {{"style", report::page_style()}, {"plotly", report::plotly()}, {"data", data}, {"script", script}}};
   std::string page;
   std::string_view rest = report::page_template();
   for (const auto& [name, text] : parts) {  // in the template's order
