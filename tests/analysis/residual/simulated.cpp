@@ -107,12 +107,14 @@ MatrixXd dense_baseline(const Observations& observations, const std::vector<int>
                         const std::vector<int>& wanted) {
   std::set<int> groups;
   for (const int row : rows) groups.insert(observations.group[static_cast<std::size_t>(row)]);
-  MatrixXd baseline = MatrixXd::Zero(static_cast<Index>(wanted.size()),
-                                     static_cast<Index>(groups.size()) + observations.slopes.cols());
+  const Index each = 1 + observations.slopes.cols();
+  MatrixXd baseline =
+      MatrixXd::Zero(static_cast<Index>(wanted.size()), static_cast<Index>(groups.size()) * each);
   for (std::size_t r = 0; r < wanted.size(); ++r) {
     const auto found = groups.find(observations.group[static_cast<std::size_t>(wanted[r])]);
-    baseline(static_cast<Index>(r), std::distance(groups.begin(), found)) = 1;
-    baseline.row(static_cast<Index>(r)).tail(observations.slopes.cols()) = observations.slopes.row(wanted[r]);
+    const Index first = std::distance(groups.begin(), found) * each;
+    baseline(static_cast<Index>(r), first) = 1;
+    baseline.row(static_cast<Index>(r)).segment(first + 1, each - 1) = observations.slopes.row(wanted[r]);
   }
   return baseline;
 }

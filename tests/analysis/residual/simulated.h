@@ -41,7 +41,7 @@ std::vector<int> all_rows(const Observations& observations);
 Eigen::MatrixXd dense_covariance(const Observations& observations, const std::vector<int>& rows,
                                  double ratio);
 
-/// Indicators of the groups of `rows` in the order of their numbers, then the slopes; for `wanted` rows.
+/// An indicator and the slopes of each group of `rows`, in the order of their numbers; for `wanted` rows.
 Eigen::MatrixXd dense_baseline(const Observations& observations, const std::vector<int>& rows,
                                const std::vector<int>& wanted);
 
