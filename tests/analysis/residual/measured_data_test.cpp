@@ -147,12 +147,20 @@ TEST_F(UiucStatic, ATrendWithSpeedIsReynoldsOrASetThatHoldsIt) {
 
 TEST_F(UiucStatic, NothingIsFoundWhereThereIsNoTrend) {
   SKIP_WITHOUT_SHARED_DATA();
-  for (const std::string hold_out : {"", "every second"})
-    for (const std::string propeller : {"grsn 11.0x6.0 - 2", "magf 10.0x8.0 - 2"}) {
-      const json e = of(propeller, hold_out);
-      EXPECT_EQ(e["verdict"], "no_structure") << propeller;
-      EXPECT_EQ(e["after"], e["before"]);
-    }
+  for (const std::string hold_out : {"", "every second"}) {
+    const json e = of("magf 10.0x8.0 - 2", hold_out);
+    EXPECT_EQ(e["verdict"], "no_structure");
+    EXPECT_EQ(e["after"], e["before"]);
+  }
+}
+
+TEST_F(UiucStatic, AWeakTrendIsNamedWithEveryEffectThatFollowsSpeedAlike) {
+  SKIP_WITHOUT_SHARED_DATA();
+  // 3 % over 1951–6338 rev/min with errors of 1 %
+  const json e = of("grsn 11.0x6.0 - 2", "");
+  EXPECT_EQ(e["verdict"], "confounded");
+  EXPECT_TRUE(in_a_set(e, "reynolds_number"));
+  EXPECT_TRUE(in_a_set(e, "tip_mach"));
 }
 
 /// Sweeps of all motors, rows with the motor turning, trained on 3S (_11) and scored on 2S (_7).
