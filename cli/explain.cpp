@@ -1,5 +1,6 @@
 // tunnelrig explain: find the residual, trace it to the effect that the model lacks, add it, report before
 // and after.
+#include "analysis/effects/expression_effect.h"
 #include "analysis/model/adopt.h"
 #include "analysis/model/model_store.h"
 #include "analysis/residual/explanation_output.h"
@@ -17,16 +18,22 @@ namespace tunnelrig::cli {
 namespace {
 
 struct Options {
-  std::string db, response, baseline, json, html;
+  std::string db, response, baseline, json, html, effects;
   SearchSettings search;
   bool list = false, adopt = false, adopt_empirical = false;
 };
 
-std::vector<const Effect*> candidates() {
-  std::vector<const Effect*> result;
-  for (const Effect& effect : all_effects()) result.push_back(&effect);
-  return result;
-}
+/// The program's effects, and the user's own.
+struct Candidates {
+  std::vector<Effect> own;
+  std::vector<const Effect*> all;
+
+  explicit Candidates(const std::string& file) {
+    if (!file.empty()) own = read_effects_toml(file);
+    for (const Effect& effect : all_effects()) all.push_back(&effect);
+    for (const Effect& effect : own) all.push_back(&effect);
+  }
+};
 
 Observations observations_of_file(const Options& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
@@ -38,11 +45,12 @@ Observations observations_of_file(const Options& options) {
 }
 
 int list(const Options& options) {
+  const Candidates candidates(options.effects);
   std::optional<Observations> observations;
   if (!options.db.empty()) observations = observations_of_file(options);
   const Observations* given = observations ? &*observations : nullptr;
-  fmt::print("{}\n", options.json.empty() ? candidates_text(candidates(), given)
-                                          : candidates_json(candidates(), given));
+  fmt::print("{}\n", options.json.empty() ? candidates_text(candidates.all, given)
+                                          : candidates_json(candidates.all, given));
   return kWell;
 }
 
@@ -67,9 +75,13 @@ void adopt_and_store(const Options& options, const Observations& observations,
 int run(Options options) {
   if (options.list) return list(options);
   if (options.db.empty()) throw InputError("--db is required (all but --list need a campaign)");
+  if ((options.adopt || options.adopt_empirical) && !options.effects.empty())
+    throw InputError(
+        "--adopt stores effects that the program has: add your own as a file first (docs/effects.md)");
+  const Candidates candidates(options.effects);
   const Observations observations = observations_of_file(options);
   const std::vector<Effect> axes = effects_of_other_axes(observations);
-  std::vector<const Effect*> effects = candidates();
+  std::vector<const Effect*> effects = candidates.all;
   for (const Effect& axis : axes) effects.push_back(&axis);
   const bool adopting = options.adopt || options.adopt_empirical;
   if (adopting) require_adoptable(observations);
@@ -121,6 +133,9 @@ void add_explain(CLI::App& app, Work& work) {
   verb->add_option("--json", options->json,
                    "Write the explanation as JSON to this file (- for standard output)");
   verb->add_option("--html", options->html, "Write a page with the pictures");
+  verb->add_option("--effects", options->effects,
+                   "Candidates of your own as expressions (.toml; docs/effects.md)")
+      ->option_text("FILE");
   verb->add_flag("--list", options->list,
                  "Print the candidates, and with --db whether this data can test them");
   verb->add_flag("--adopt", options->adopt, "Store the accepted effects as the next version of the model");

@@ -14,9 +14,8 @@ const bracket = ([low, high]) => `[${digits(low)}, ${digits(high)}]`;
 const unitSuffix = (unit) => (unit && unit !== '1' ? ` ${unit}` : '');
 const unitBracket = (unit) => (unit === '' ? '' : ` [${unit === '1' ? '–' : unit}]`);
 
-const effectLabel = ({effect, form, rotor, from_rotor: from}) =>
-    effect + (form ? ` (${form})` : '') + (from ? ` from rotor ${from}` : '') +
-    (rotor ? ` ${from ? 'to' : 'of'} rotor ${rotor}` : '');
+const effectLabel = ({effect, form, rotor, from_rotor: from}) => effect + (form ? ` (${form})` : '') +
+    (from ? ` from rotor ${from}` : '') + (rotor ? ` ${from ? 'to' : 'of'} rotor ${rotor}` : '');
 
 function drawErrors({before, after, noise_floor: floor, unit}) {
   const names = ['noise floor', 'after', 'before'];
@@ -76,15 +75,16 @@ function errorFigure(explanation, made) {
       `Error on blocks held out: before ${value(before)}, after ${value(after)}; bars are 95 % intervals,`,
       'by resampling the blocks. The noise floor,',
       `${digits(floor, 4)}${unitSuffix(unit)}, is the error to expect of an exact model: scatter of runs`,
-      'and sessions, and the uncertainty of its coefficients.');
+      'and sessions, and the uncertainty of its coefficients.',
+      explanation.unknown.length &&
+          'Structure without a name is no part of the error after, but is allowed for in the floor.');
   return figure(
-      'Error before and after', [],
-      plot(
-          'Held-out error before and after, and the noise floor', () => 230, () => drawErrors(explanation)),
+      'Held-out error', [],
+      plot('Held-out error before and after, and the noise floor', () => 230, () => drawErrors(explanation)),
       caption, made);
 }
 
-const parameterTable = (adopted) => {
+const parameterTable = (adopted, unit) => {
   const rows = adopted.flatMap(
       (effect) => Object.entries(effect.parameters).map(([name, p]) => ({effect, name, ...p})));
   return table(
@@ -96,7 +96,7 @@ const parameterTable = (adopted) => {
         {name: '95 % interval', cell: (r) => bracket(r.ci95)},
         {name: 'unit', cell: (r) => (r.unit === '1' ? '–' : r.unit), text: true},
         {name: 'p of the effect', cell: (r) => digits(r.effect.p_value)},
-        {name: 'gain', cell: (r) => digits(r.effect.held_out_gain)},
+        {name: `gain${unitBracket(unit)}`, cell: (r) => digits(r.effect.held_out_gain)},
       ],
       rows);
 };
@@ -105,7 +105,8 @@ const parameterTable = (adopted) => {
 function confusionText({confounded_with: rivals, separating_run: run}) {
   if (!rivals.length) return 'Nothing else that was tried does as well on blocks that it has not seen.';
   const list = rivals.map((name) => `\`${name}\``).join(', ');
-  const remedy = run ? ` To tell them apart, make ${run.text}.` : ' No run within reach would tell them apart.';
+  const remedy =
+      run ? ` To tell them apart, make ${run.text}.` : ' No run within reach would tell them apart.';
   return `These data cannot tell it from ${list}.${remedy}`;
 }
 

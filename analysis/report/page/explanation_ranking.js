@@ -1,10 +1,16 @@
 // How candidates ranked, and what the largest evidence is where there is no effect.
 
-const verticalLine = (x, colour, dash) => ({
-  type: 'line', yref: 'paper', y0: 0, y1: 1, x0: x, x1: x, line: {color: colour, width: 2, dash}
-});
+const verticalLine = (x, colour, dash) =>
+    ({type: 'line', yref: 'paper', y0: 0, y1: 1, x0: x, x1: x, line: {color: colour, width: 2, dash}});
 const note = (x, y, text, colour, anchor = 'left') => ({
-  x, y, yref: 'paper', text, showarrow: false, xanchor: anchor, yanchor: 'top', font: {color: colour, size: 12},
+  x,
+  y,
+  yref: 'paper',
+  text,
+  showarrow: false,
+  xanchor: anchor,
+  yanchor: 'top',
+  font: {color: colour, size: 12},
   bgcolor: style('--page')
 });
 
@@ -24,8 +30,9 @@ function drawRanking({ranking, critical}) {
       hovertemplate: '%{text}<extra></extra>'
     }],
     layout: {
-      xaxis: axis('evidence −log<sub>10</sub> p, with prior weight [–]', {rangemode: 'tozero'}),
-      yaxis: axis('', {tickmode: 'array', tickvals: best.map((_, i) => i), ticktext: names, tickfont: {size: 11}}),
+      xaxis: axis('evidence [–]', {rangemode: 'tozero'}),
+      yaxis: axis(
+          '', {tickmode: 'array', tickvals: best.map((_, i) => i), ticktext: names, tickfont: {size: 11}}),
       shapes: [verticalLine(critical, style('--ink'), 'dash')],
       showlegend: false
     }
@@ -46,7 +53,7 @@ function drawNull({null_maxima: maxima, observed, critical}) {
     }],
     layout: {
       xaxis: axis('largest evidence of all candidates [–]', {range: [Math.min(0, ...maxima), most]}),
-      yaxis: axis('simulated campaigns without effect [–]'),
+      yaxis: axis('simulated campaigns [–]'),
       shapes: [verticalLine(critical, blue, 'dash'), verticalLine(observed, orange, 'solid')],
       annotations: [
         note(critical, 1, ` α = ${digits(report.settings.alpha)} `, blue),
@@ -74,15 +81,17 @@ const rankingTable = (ranking) => table(
 function roundFigure(round, i, made) {
   const outcome = round.outcome.replace(/; $/, '');
   const caption = sentences(
-      'Left: each candidate’s evidence in its best way; dashed: what α asks for. Right: the largest evidence of all',
-      `candidates together in ${counted(round.null_maxima.length, 'campaign')} simulated without effect, on this`,
+      'Left: each candidate’s evidence in its best way, −log10 of its own p with its prior weight; dashed: what α asks for. Right: the largest evidence of all',
+      `candidates together in ${
+          counted(round.null_maxima.length, 'campaign')} simulated without effect, on this`,
       'campaign’s own design; the share beyond the observed one is its p.');
-  const panels = h(
-      'div', {class: 'pair'},
-      h('div', {}, plot(
-          `Evidence of the candidates in round ${i + 1}`, () => 90 + 24 * Math.min(15, round.ranking.length),
-          () => drawRanking(round))),
-      h('div', {}, plot(`Null distribution of round ${i + 1}`, () => 360, () => drawNull(round))));
+  const panels =
+      h('div', {class: 'pair'},
+        h('div', {},
+          plot(
+              `Evidence of the candidates in round ${i + 1}`,
+              () => 90 + 24 * Math.min(15, round.ranking.length), () => drawRanking(round))),
+        h('div', {}, plot(`Null distribution of round ${i + 1}`, () => 360, () => drawNull(round))));
   return [
     figure(`Round ${i + 1}: ${outcome}`, [], panels, caption, made),
     folded(`All candidates of round ${i + 1} with standard errors`, () => rankingTable(round.ranking)),
@@ -93,6 +102,7 @@ function curveRoundFigure(round, i, made) {
   const caption = sentences(
       'Smooth dependence on each covariate, the order of runs and the time within them, tried together:',
       `the largest evidence in ${counted(round.null_maxima.length, 'campaign')} simulated without any.`);
-  const place = plot(`Null distribution of structure without a name, ${i + 1}`, () => 320, () => drawNull(round));
+  const place =
+      plot(`Null distribution of structure without a name, ${i + 1}`, () => 320, () => drawNull(round));
   return figure(`Structure without a name: ${round.outcome}`, [], place, caption, made);
 }

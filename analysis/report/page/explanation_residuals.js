@@ -1,10 +1,27 @@
 // Residuals against what they depend on, before and after.
 
 const suffixes = {
-  _K_s: 'K/s', _m_s: 'm/s', _rpm: 'rpm', _Pa: 'Pa', _Hz: 'Hz', _C: '°C', _K: 'K', _V: 'V', _A: 'A', _N: 'N',
-  _R: 'R', _s: 's', _m: 'm'
+  _K_s: 'K/s',
+  _m_s: 'm/s',
+  _rpm: 'rpm',
+  _Pa: 'Pa',
+  _Hz: 'Hz',
+  _C: '°C',
+  _K: 'K',
+  _V: 'V',
+  _A: 'A',
+  _N: 'N',
+  _R: 'R',
+  _s: 's',
+  _m: 'm'
 };
-const plainUnits = {hours_in_session: 'h', relative_humidity: '–', run_order: '–', session: '–', clip_fraction: '–'};
+const plainUnits = {
+  hours_in_session: 'h',
+  relative_humidity: '–',
+  run_order: '–',
+  session: '–',
+  clip_fraction: '–'
+};
 
 /** "air_temperature_C [°C]"; columns that say nothing of their unit stand alone. */
 function covariateTitle(name) {
@@ -26,8 +43,11 @@ function binsOf(x) {
   const values = [...new Set(x)];
   if (values.length <= 14) return values.sort((a, b) => a - b).map((v) => order.filter((i) => x[i] === v));
   const count = 12;
-  return Array.from({length: count}, (_, k) => order.slice(
-      Math.round((k * order.length) / count), Math.round(((k + 1) * order.length) / count)))
+  return Array
+      .from(
+          {length: count},
+          (_, k) => order.slice(
+              Math.round((k * order.length) / count), Math.round(((k + 1) * order.length) / count)))
       .filter((bin) => bin.length);
 }
 
@@ -108,8 +128,7 @@ function panelFigure(panel, made) {
   const reach = reachOf([...panel.before, ...panel.after]);
   const one = (which, title) => h(
       'div', {}, h('h4', {}, title),
-      plot(
-          `Residual against ${panel.covariate}, ${title}`, () => 320, () => drawPanel(panel, which, reach)));
+      plot(`Residual against ${panel.covariate}, ${title}`, () => 320, () => drawPanel(panel, which, reach)));
   const of = panel.rotor ? `rotor ${panel.rotor}` : report.runs.before.length > 1 ? 'all rotors' : 'all rows';
   const session = panel.covariate === 'session';
   const caption = session ?
@@ -126,20 +145,28 @@ function panelFigure(panel, made) {
 function drawOrder(which, reach) {
   const {runs} = report;
   const colours = rotorColours();
-  const data = runs[which].map((values, c) => ({
-    type: 'scatter',
-    mode: 'markers',
-    name: runs[which].length > 1 ? `rotor ${c + 1}` : 'residual',
-    x: values.map((_, i) => i + 1),
-    y: values,
-    text: values.map((_, i) => runText(i, c + 1)),
-    marker: {color: colours[c % 4], symbol: symbols[c % 4], size: 4, opacity: 0.7},
-    hovertemplate: '%{text}<br>%{y:.4g}<extra></extra>'
-  }));
+  const data =
+      runs[which].map((values, c) => ({
+                        type: 'scatter',
+                        mode: 'markers',
+                        name: runs[which].length > 1 ? `rotor ${c + 1}` : 'residual',
+                        x: values.map((_, i) => i + 1),
+                        y: values,
+                        text: values.map((_, i) => runText(i, c + 1)),
+                        marker: {color: colours[c % 4], symbol: symbols[c % 4], size: 4, opacity: 0.7},
+                        hovertemplate: '%{text}<br>%{y:.4g}<extra></extra>'
+                      }));
   const starts = runs.block.flatMap((block, i) => (i > 0 && block !== runs.block[i - 1] ? [i + 0.5] : []));
   const shapes = starts.length > 60 ? [] : starts.map((x) => ({
-    type: 'line', yref: 'paper', y0: 0, y1: 1, x0: x, x1: x, layer: 'below', line: {color: style('--line'), width: 1}
-  }));
+                                                        type: 'line',
+                                                        yref: 'paper',
+                                                        y0: 0,
+                                                        y1: 1,
+                                                        x0: x,
+                                                        x1: x,
+                                                        layer: 'below',
+                                                        line: {color: style('--line'), width: 1}
+                                                      }));
   return {
     data,
     layout: {
@@ -155,36 +182,44 @@ function drawOrder(which, reach) {
 function orderFigure(made) {
   const {runs} = report;
   const reach = reachOf([...runs.before, ...runs.after].flat().filter(known));
-  const one = (which) => h(
-      'div', {}, h('h4', {}, which),
-      plot(`Residuals in order of time, ${which}`, () => 320, () => drawOrder(which, reach)));
+  const one = (which) =>
+      h('div', {}, h('h4', {}, which),
+        plot(`Residuals in order of time, ${which}`, () => 320, () => drawOrder(which, reach)));
   const caption = sentences(
       'Residuals of all runs as the whole model is fitted to all of them, before with the baseline alone.',
       'Vertical lines: a new block begins.');
   return figure(
-      'Residuals in order of time', [], h('div', {class: 'pair'}, one('before'), one('after')), caption, made);
+      'Residuals in order of time', [], h('div', {class: 'pair'}, one('before'), one('after')), caption,
+      made);
 }
 
-function drawCourse(course, which) {
+function drawCourse(course, which, reach) {
   const [blue, orange] = rotorColours();
   const seconds = course.u.map((u) => u * course.duration_s);
   const middle = which === 'before' ? course.measured : course.after;
   const half = which === 'before' ? course.half : course.after_half;
   const edge = (sign, more) => ({
-    type: 'scatter', mode: 'lines', x: seconds, y: middle.map((v, i) => v + sign * half[i]), line: {width: 0},
-    hoverinfo: 'skip', showlegend: false, ...more
+    type: 'scatter',
+    mode: 'lines',
+    x: seconds,
+    y: middle.map((v, i) => v + sign * half[i]),
+    line: {width: 0},
+    hoverinfo: 'skip',
+    showlegend: false,
+    ...more
   });
   const line = (name, y, colour, dash) =>
       ({type: 'scatter', mode: 'lines', name, x: seconds, y, line: {color: colour, width: 2.5, dash}});
   const data = [
-    edge(-1, {}), edge(1, {fill: 'tonexty', fillcolor: `${blue}33`}), line('mean of the runs', middle, blue, 'solid')
+    edge(-1, {}), edge(1, {fill: 'tonexty', fillcolor: `${blue}33`}),
+    line('mean of the runs', middle, blue, 'solid')
   ];
   if (which === 'before') data.push(line('model', course.model, orange, 'dash'));
   return {
     data,
     layout: {
       xaxis: axis('time since the run’s first frame [s]'),
-      yaxis: axis('reading over the run’s mean [%]'),
+      yaxis: axis('reading over the run’s mean [%]', {range: [-reach, reach]}),
       showlegend: true,
       legend: {orientation: 'h', y: 1.02, yanchor: 'bottom'}
     }
@@ -192,9 +227,11 @@ function drawCourse(course, which) {
 }
 
 function courseFigure(course, made) {
-  const one = (which) => h(
-      'div', {}, h('h4', {}, which),
-      plot(`Course within the run, ${which}`, () => 300, () => drawCourse(course, which)));
+  const reach =
+      reachOf(course.measured.flatMap((v, i) => [v - course.half[i], v + course.half[i], course.model[i]]));
+  const one = (which) =>
+      h('div', {}, h('h4', {}, which),
+        plot(`Course within the run, ${which}`, () => 300, () => drawCourse(course, which, reach)));
   return figure(
       `${course.label}, within the runs`, [], h('div', {class: 'pair'}, one('before'), one('after')),
       'Mean course of the runs’ windows with its 95 % band, as its first six cosines give it.', made);

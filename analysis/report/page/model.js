@@ -8,8 +8,9 @@ function modelSection(versions) {
         prose(`Model ${version}, stored ${created}, from ${counted(explanation.runs, 'run')} in ${
             counted(explanation.blocks, 'block')}; response ${explanation.response}.`)),
       errorFigure(explanation, made),
-      adopted.length ? parameterTable(adopted) : [],
-      adopted.map((effect) => h('p', {}, h('strong', {}, `${effectLabel(effect)}. `), prose(confusionText(effect)))),
+      adopted.length ? parameterTable(adopted, unit) : [],
+      adopted.map(
+          (effect) => h('p', {}, h('strong', {}, `${effectLabel(effect)}. `), prose(confusionText(effect)))),
       unknown.map((u) => h('p', {}, h('strong', {}, 'unknown. '), prose(unknownText(u, unit)))),
     ];
   });
