@@ -198,8 +198,12 @@ class Recording {
     end_reason_ = end_reason.empty() ? "complete" : end_reason;
     outcome.clock = packets_.clock().estimate();
     outcome.ledger = ledger();
-    if (outcome.clock)
-      outcome.ledger.board_rate_hz = outcome.clock->rate_hz;  // measured, not what it is meant to be
+    if (outcome.clock) {  // measured, not what it is meant to be
+      outcome.ledger.board_rate_hz = outcome.clock->rate_hz;
+      outcome.ledger.rate_interval_hz = outcome.clock->rate_interval_hz;
+      outcome.ledger.drift_ppm_h = outcome.clock->drift_ppm_h;
+      outcome.ledger.drift_interval_ppm_h = outcome.clock->drift_interval_ppm_h;
+    }
     const std::string hash = writer_.finish(outcome.state, outcome.ledger);
     outcome.statistics = summarizer.finish(hash);
     return outcome;

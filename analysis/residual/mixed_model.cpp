@@ -176,6 +176,7 @@ Stacked MixedModel::baseline_prediction(std::size_t stratum, std::size_t ratio, 
   Eigen::Map<MatrixXd> predicted(result.data(), wanted, modes * columns.cols());
   for (const Part& part : prepared_[ratio].parts) {
     const std::vector<Index> where = rows_of(part, rows);
+    if (where.empty()) continue;
     std::vector<int> asked;
     for (const Index r : where) asked.push_back(rows[static_cast<std::size_t>(r)]);
     predicted(where, Eigen::all) =
@@ -191,6 +192,7 @@ Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t r
       Eigen::VectorXd::Constant(static_cast<Index>(rows.size()), std::numeric_limits<double>::quiet_NaN());
   for (const Part& part : prepared_[ratio].parts) {
     const std::vector<Index> where = rows_of(part, rows);
+    if (where.empty()) continue;
     std::vector<int> asked;
     for (const Index r : where) asked.push_back(rows[static_cast<std::size_t>(r)]);
     // L_row (LᵀV⁻¹L)⁻¹ L_rowᵀ with LᵀV⁻¹L = P RᵀR Pᵀ

@@ -10,10 +10,15 @@
 #include "support/message_of.h"
 
 #include <cerrno>
+#include <cstdlib>
+#include <filesystem>
 #include <map>
+#include <stdexcept>
 #include <thread>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 namespace tunnelrig {
 namespace {
@@ -130,6 +135,40 @@ TEST(Usb, SaysWhyABoardCannotBeHad) {
   EXPECT_NE(message_of([] { open_source("usb:,bogus"); }).find("test-pattern"), std::string::npos);
   EXPECT_NE(message_of([] { open_source("usb:,rate=1333"); }).find("refuses"), std::string::npos);
   EXPECT_NE(message_of([] { open_source("usb:,rate=1/0"); }).find("rate=4000/3"), std::string::npos);
+}
+
+/// Takes the right to open a board's node away; root loses it by becoming nobody for a while.
+struct NoPermission {
+  explicit NoPermission(const UsbDevice& device) {
+    namespace fs = std::filesystem;
+    const fs::path bed = std::getenv("UMOCKDEV_DIR");
+    fs::permissions(bed, fs::perms::all);  // sockets stand in for the kernel; they are not what is refused
+    for (const auto& entry : fs::recursive_directory_iterator(bed))
+      if (entry.is_socket() || entry.is_directory()) fs::permissions(entry.path(), fs::perms::all);
+    fs::permissions(bed / fmt::format("dev/bus/usb/{:03}/{:03}", device.bus, device.address),
+                    fs::perms::none);
+    if (was_ == 0 && ::seteuid(65534) != 0) throw std::runtime_error("root cannot become nobody");
+  }
+  ~NoPermission() {
+    if (was_ == 0 && ::seteuid(was_) != 0) std::abort();
+  }
+  NoPermission(const NoPermission&) = delete;
+  NoPermission& operator=(const NoPermission&) = delete;
+
+ private:
+  uid_t was_ = ::geteuid();
+};
+
+TEST(Usb, NamesTheRuleWherePermissionIsMissing) {
+  Rig rig(Pace::kRig);
+  const auto board = list_usb_boards();
+  ASSERT_EQ(board.size(), 1u);
+  const NoPermission held(board[0]);
+  const auto found = list_usb_boards();
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].no_permission);
+  EXPECT_NE(found[0].problem.find("60-tunnelrig.rules"), std::string::npos) << found[0].problem;
+  EXPECT_NE(test::message_of([] { open_source("usb"); }).find("60-tunnelrig.rules"), std::string::npos);
 }
 
 TEST(Usb, SetsRateOversamplingAndPattern) {
