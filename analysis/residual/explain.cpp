@@ -452,9 +452,12 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   explanation.detectable = found.detectable_sigma * scale;
 
   // The seal is opened: nothing that was decided above changes any more. Curves have no name, so they are not
-  // part of "after".
+  // part of "after" unless they are asked for.
   JointFit named = found.final;
-  if (!found.curves.empty()) {
+  if (settings.empirical)
+    for (const FoundCurve& found_curve : found.curves)
+      explanation.empirical.push_back(found_curve.curve.label());
+  if (!found.curves.empty() && !settings.empirical) {
     MeanModel terms = found.final.model;
     terms.curves.clear();
     named = found.accepted.empty() ? found.baseline : fit_jointly(found.observations, terms, seal.open);
