@@ -133,6 +133,10 @@ void add_explain(CLI::App& app, Work& work) {
       ->check(CLI::Range(99, 99999))
       ->capture_default_str();
   verb->add_option("--seed", options->search.seed, "Of seal and simulations")->capture_default_str();
+  verb->add_option("--session-ratio", options->search.session_ratio,
+                   "Session scatter over run scatter above which it is an unknown")
+      ->check(CLI::Range(0.1, 7.0))
+      ->capture_default_str();
   verb->add_option("--json", options->json,
                    "Write the explanation as JSON to this file (- for standard output)");
   verb->add_option("--html", options->html, "Write a page with the pictures");

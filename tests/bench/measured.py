@@ -104,15 +104,15 @@ def line(data, hold_out, explanations, scales, goal="", limit=None, unit="%", al
             counted(rivals(explanations)), verdict, goal, met, remark]
 
 
-HEADER = ["data", "held out", "before", "after", "floor", "adopted", "confounded with", "verdict", "goal", "", ""]
+HEADER = ["data", "held out", "before", "after", "floor", "adopted", "confounded with", "verdicts", "goal", "", ""]
 
 
 def print_table(rows):
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     for k, row in enumerate(rows):
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
+        print("| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths)) + " |")
         if k == 0:
-            print("-" * (sum(widths) + 2 * len(widths) - 2))
+            print("|" + "|".join("-" * (width + 2) for width in widths) + "|")
 
 
 def read(path):
@@ -215,7 +215,7 @@ def strawson_rows(data):
         for row, rpm in zip(sweep, speed):
             thrust = abs(float(row["Thrust (gf)"] or 0))
             if rpm > 0.05 * max(speed) and thrust > 2:
-                rows.append({"group": group, "cells": 3 if supply == "11" else 2, "esc_us": row["ESC signal (µs)"],
+                rows.append({"group": group, "cells": 3 if supply == "11" else 2, "throttle_us": float(row["ESC signal (µs)"]) - 1000,
                              "thrust_gf": thrust, "voltage_V": row["Voltage (V)"], "speed_rpm": rpm})
     return rows
 
@@ -225,7 +225,7 @@ def strawson(loop, data):
     hold_out = "cells == 2"
     voltage = [("voltage_V", "V", "supply_voltage_V")]
     speed = '[speed]\ncolumn = "speed_rpm"\nunit = "rpm"\n[propeller]\ndiameter_m = 0.127\n'
-    throttle = ["--baseline", "power:esc_us"]
+    throttle = ["--baseline", "power:throttle_us"]
 
     def table(name, chosen, **how):
         return Table(name, chosen, ("thrust_gf", "gf", "thrust_N"), ["group"], "rows", hold_out, voltage, **how)
@@ -287,12 +287,14 @@ def ground(loop, data):
     for name, rows in by_configuration.items():
         scale = [share_of(mean_of(rows, "thrust_N"))]
         for what, hold_out in (("every second height", f"sin(rank(ground_distance_R)*{len(rows)}*_pi) < 0"),
-                               ("every second height, the lowest first", f"sin(rank(ground_distance_R)*{len(rows)}*_pi) > 0"),
+                               ("every second height, the lowest too", f"sin(rank(ground_distance_R)*{len(rows)}*_pi) > 0"),
                                ("every third height", f"sin(rank(ground_distance_R)*{len(rows)}*_pi*2/3) < -0.5"),
                                (ALL, "")):
             found = loop.explain(Table(name, rows, ("thrust_N", "N", "thrust_N"), ["configuration"], "rows", hold_out,
                                        distance))
-            goal = {"every second height": ("≤ 0.6 %", 0.6)}.get(what, ("", None))
+            goal = ("", None)
+            if name == "coplanar":  # the goals' figures are of the second of these splits
+                goal = ("≤ 0.6 %", 0.6) if what.endswith("the lowest too") else ("≤ 1.3 %", 1.3)
             yield line(f"ground effect, {name}", what, [found], scale, *goal,
                        also="ground_effect" in " ".join(names([found])))
 
