@@ -103,7 +103,9 @@ int run(Options options) {
     write_text(options.html, explanation_html(explanation, observations, options.search,
                                               {options.db, program_version(), arguments(), now_utc()}));
   if (options.adopt_empirical && !adoptable(observations))
-    warn("a model corrects the thrusts of a campaign: the curve is in the errors above, and nothing is stored");
+    warn(
+        "a model corrects the thrusts of a campaign: the curve is in the errors above, and nothing is "
+        "stored");
   else if (options.adopt || options.adopt_empirical)
     adopt_and_store(options, observations, explanation);
   return kWell;
