@@ -50,13 +50,13 @@ AnyController::AnyController(std::string_view name, const GainTable& gains, cons
     : controller_(make(name, context)) {
   const auto table = gains.find(name);
   if (table == gains.end()) return;
-  for (const Gain& gain : gain_list()) {
+  for (const NamedGain& gain : gain_list()) {
     const auto value = table->second.find(std::string(gain.name));
     if (value != table->second.end()) *gain.value = value->second;
   }
 }
 
-std::vector<Gain> AnyController::gain_list() {
+std::vector<NamedGain> AnyController::gain_list() {
   return std::visit([](auto& controller) { return controller.gain_list(); }, controller_);
 }
 
@@ -89,7 +89,7 @@ GainTable parse_gains(std::string_view text, const std::string& file) {
     const auto known = controller.gain_list();
     for (const auto& [gain_key, value_node] : *table) {
       const auto gain =
-          std::find_if(known.begin(), known.end(), [&](const Gain& g) { return g.name == gain_key.str(); });
+          std::find_if(known.begin(), known.end(), [&](const NamedGain& g) { return g.name == gain_key.str(); });
       if (gain == known.end())
         throw InputError::at(file, line_of(value_node), "{} has no gain {}", name, gain_key.str());
       const auto value = value_node.value<double>();

@@ -1,7 +1,7 @@
 // What a position controller is given and what it gives. A controller is a struct with
 //   ControlOutput step(const ControlInput&)   once per period of 1/400 s, without allocation
 //   void reset()                              forgets what it has integrated
-//   std::vector<Gain> gain_list()             its gains by name, with their limits
+//   std::vector<NamedGain> gain_list()             its gains by name, with their limits
 #pragma once
 
 #include "flight/vehicle/airframe.h"
@@ -36,7 +36,7 @@ struct ControlOutput {
   double roll_moment_N_m = 0;          // fed forward past the attitude loop
 };
 
-struct Gain {
+struct NamedGain {
   std::string_view name;
   double* value = nullptr;
   double lowest = 0, highest = 0;  // for the optimiser and for files

@@ -41,7 +41,7 @@ class Indi {
   }
 
   void reset() { *this = Indi(gains_); }
-  std::vector<Gain> gain_list();
+  std::vector<NamedGain> gain_list();
 
  private:
   IndiGains gains_;

@@ -2,15 +2,27 @@
 
 #include "flight/simulation/flight_loop.h"
 
+#include <Eigen/LU>
+
 namespace tunnelrig {
 namespace {
+
+/// Two columns see upright and level walls only; a section with any other needs all directions.
+HoughForm form_for(const Tunnel& tunnel) {
+  if (tunnel.circle_diameter_m > 0) return HoughForm::circle;
+  const auto corners = tunnel.section.vertices();
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const SectionPoint along = corners[(i + 1) % corners.size()] - corners[i];
+    if (std::min(std::abs(along.x()), std::abs(along.y())) > 1e-6) return HoughForm::all_directions;
+  }
+  return HoughForm::two_columns;
+}
 
 MatcherSettings matcher_settings(const FlightSpace& space, const LidarSettings& lidar) {
   MatcherSettings settings;
   settings.layout = lidar.layout;
   settings.least_range_m = lidar.least_range_m;
   settings.most_range_m = lidar.most_range_m;
-  settings.range_sigma_m = lidar.range_sigma_m;
   settings.form = form_for(space.tunnel);
   settings.circle_diameter_m = space.tunnel.circle_diameter_m;
   return settings;
@@ -61,9 +73,10 @@ void Localisation::scan(const EstimatorInput& in) {
 
 PlanarEstimate Localisation::step(const EstimatorInput& in) {
   if (!first_) {
-    filter_.predict(
-        {{{in.modelled_m_s2[0], in.modelled_m_s2[1]}, {in.acceleration_m_s2[0], in.acceleration_m_s2[1]}}},
-        kControlStep_s);
+    AugmentedModel::Input input;
+    input.modelled_m_s2 = Eigen::Vector2d(in.modelled_m_s2[0], in.modelled_m_s2[1]);
+    input.measured_m_s2 = Eigen::Vector2d(in.acceleration_m_s2[0], in.acceleration_m_s2[1]);
+    filter_.predict(input, kControlStep_s);
   }
   first_ = false;
   constexpr double kHalfStep_s = 0.5 * kControlStep_s;

@@ -28,8 +28,8 @@ class Localisation {
  private:
   /// A match on its way to the filter.
   struct Pending {
-    Eigen::Vector2d position_m;
-    Eigen::Matrix2d covariance_m2;
+    Eigen::Vector2d position_m{0, 0};
+    Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
     double taken_s = 0, due_s = 0;
     bool waits = false;
   };
