@@ -46,7 +46,7 @@ class AnyController {
   }
 
   /// Pointers into this object.
-  std::vector<Gain> gain_list();
+  std::vector<NamedGain> gain_list();
 
  private:
   using Variant = std::variant<Ibs, IbsMap, IbsObserver, Indi, PidCascade, PidSingle>;

@@ -3,7 +3,7 @@
 //
 //     ControlOutput step(const ControlInput&);   // every step_s
 //     void reset();                              // forgets integrals and filters
-//     std::vector<Gain> gain_list();             // what tuning and gain files may move
+//     std::vector<NamedGain> gain_list();             // what tuning and gain files may move
 #pragma once
 
 #include "flight/vehicle/airframe.h"
@@ -49,7 +49,7 @@ inline ControlOutput thrust_vector(const Plane& wanted_m_s2, double cos_tilt, co
 }
 
 /// A gain by name, where it stands and what it may be.
-struct Gain {
+struct NamedGain {
   std::string_view name;
   double* value;
   double lowest, highest;

@@ -54,10 +54,10 @@ class Ibs {
   void reset() { beta_ = {}; }
   const Plane& beta() const { return beta_; }
 
-  std::vector<Gain> gain_list();
+  std::vector<NamedGain> gain_list();
 
   /// Also those of the lead, which the thesis's controller has not.
-  std::vector<Gain> gain_list_with_lead();
+  std::vector<NamedGain> gain_list_with_lead();
 
   const OutputLimits& limits() const { return gains_.limits; }
 

@@ -38,7 +38,7 @@ class IbsMap {
   }
 
   void reset() { ibs_.reset(); }
-  std::vector<Gain> gain_list();
+  std::vector<NamedGain> gain_list();
 
  private:
   Ibs ibs_;

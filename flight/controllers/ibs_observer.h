@@ -51,7 +51,7 @@ class IbsObserver {
   }
 
   void reset() { *this = IbsObserver(gains_); }
-  std::vector<Gain> gain_list();
+  std::vector<NamedGain> gain_list();
 
  private:
   IbsObserverGains gains_;

@@ -40,7 +40,7 @@ class Indi {
   }
 
   void reset() { *this = Indi(gains_); }
-  std::vector<Gain> gain_list();
+  std::vector<NamedGain> gain_list();
 
  private:
   IndiGains gains_;

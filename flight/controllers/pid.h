@@ -59,7 +59,7 @@ class PidCascade {
 
   ControlOutput step(const ControlInput& in);
   void reset();
-  std::vector<Gain> gain_list();
+  std::vector<NamedGain> gain_list();
 
  private:
   AltitudeCascade altitude_;
@@ -84,7 +84,7 @@ class PidSingle {
 
   ControlOutput step(const ControlInput& in);
   void reset();
-  std::vector<Gain> gain_list();
+  std::vector<NamedGain> gain_list();
 
  private:
   AltitudeCascade altitude_;

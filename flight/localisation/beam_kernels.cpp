@@ -1,0 +1,236 @@
+#include "flight/localisation/beam_kernels.h"
+
+#if defined(__x86_64__)
+#define TUNNELRIG_X86 1
+#endif
+
+namespace tunnelrig {
+namespace {
+
+// Forced into the functions below, which are compiled for one instruction set each.
+#define TUNNELRIG_BODY [[gnu::always_inline]] static inline
+
+using Floats = float __attribute__((vector_size(64), may_alias));
+using Ints = std::int32_t __attribute__((vector_size(64), may_alias));
+
+constexpr float kFar_m = 1e7F;
+
+struct Body {
+  TUNNELRIG_BODY int load(const float* range, const Beams& beams, float least, float most) {
+    std::int32_t wrong = 0;
+    std::int32_t returned = 0;
+    for (std::size_t i = 0; i < beams.count; ++i) {
+      const float value = range[i];
+      const bool in = (value > least) & (value < most);
+      wrong |= value != value ? 1 : 0;
+      returned += in ? 1 : 0;
+      beams.range[i] = in ? value : 0.0F;
+    }
+    return wrong != 0 ? -1 : returned;
+  }
+
+  TUNNELRIG_BODY void project(const Beams& beams, const Projection& p) {
+    for (std::size_t i = 0; i < beams.padded; i += kLanes) {
+      const Floats c = *reinterpret_cast<const Floats*>(beams.cosine + i);
+      const Floats s = *reinterpret_cast<const Floats*>(beams.sine + i);
+      const Floats range = *reinterpret_cast<const Floats*>(beams.range + i);
+      const Floats y = p.yy * c + p.yz * s;
+      const Floats z = p.zy * c + p.zz * s;
+      const Ints returned = range > 0.0F;
+      const Floats far = Floats{} + kFar_m;
+      *reinterpret_cast<Floats*>(beams.along_y + i) = y;
+      *reinterpret_cast<Floats*>(beams.along_z + i) = z;
+      *reinterpret_cast<Floats*>(beams.y + i) = returned ? range * y : far;
+      *reinterpret_cast<Floats*>(beams.z + i) = returned ? range * z : far;
+    }
+  }
+
+  TUNNELRIG_BODY void cells(const Beams& beams, float y_per_cell, float z_per_cell, float offset, float last,
+                            std::int32_t* cell) {
+    for (std::size_t i = 0; i < beams.padded; ++i) {
+      float at = y_per_cell * beams.y[i] + z_per_cell * beams.z[i] + offset;
+      at = at < 0.0F ? 0.0F : at;
+      at = at > last ? last : at;
+      cell[i] = static_cast<std::int32_t>(at);
+    }
+  }
+
+  TUNNELRIG_BODY void see(const Beams& beams, std::size_t first, std::size_t last, float wall_y,
+                          float wall_z) {
+    const float* along_y = beams.along_y;
+    const float* along_z = beams.along_z;
+    float* __restrict inverse = beams.inverse;
+    float* __restrict to_y = beams.wall_y;
+    float* __restrict to_z = beams.wall_z;
+    for (std::size_t i = first; i < last; ++i) {
+      const float value = wall_y * along_y[i] + wall_z * along_z[i];
+      const bool nearer = value > inverse[i];
+      inverse[i] = nearer ? value : inverse[i];
+      to_y[i] = nearer ? wall_y : to_y[i];
+      to_z[i] = nearer ? wall_z : to_z[i];
+    }
+  }
+
+  template <int unknowns>
+  TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, FitSums& sums) {
+    Floats normal[unknowns * (unknowns + 1) / 2] = {};
+    Floats gradient[unknowns] = {};
+    Floats square = {};
+    Ints inliers = {};
+    Ints beyond = {};
+    Ints expected = {};
+    const Floats zero = {};
+    const Floats one = zero + 1.0F;
+    for (std::size_t i = 0; i < beams.padded; i += kLanes) {
+      const Floats range = *reinterpret_cast<const Floats*>(beams.range + i);
+      const Floats inverse = *reinterpret_cast<const Floats*>(beams.inverse + i);
+      const Floats wall_y = *reinterpret_cast<const Floats*>(beams.wall_y + i);
+      const Floats wall_z = *reinterpret_cast<const Floats*>(beams.wall_z + i);
+      const Ints met = (range > 0.0F) & (inverse > 0.0F);
+      const Floats should = one / (met ? inverse : one);
+      const Floats error = range - should;
+      const Ints in = met & (error < gate) & (error > -gate);
+      expected -= met;
+      inliers -= in;
+      beyond -= met & (error >= gate);
+      const Floats e = in ? error : zero;
+      Floats j[unknowns];
+      // Moving by d towards a wall shortens the range by d·wall·range.
+      const Floats scale = in ? -should : zero;
+      j[0] = scale * wall_y;
+      j[1] = scale * wall_z;
+      if constexpr (unknowns >= 3) {
+        const Floats c = *reinterpret_cast<const Floats*>(beams.cosine + i);
+        const Floats s = *reinterpret_cast<const Floats*>(beams.sine + i);
+        j[2] = scale * should * (wall_y * (p.yz * c - p.yy * s) + wall_z * (p.zz * c - p.zy * s));
+      }
+      if constexpr (unknowns >= 4)
+        j[3] = scale * should * wall_y * *reinterpret_cast<const Floats*>(beams.along_y + i);
+      square += e * e;
+      for (int a = 0, k = 0; a < unknowns; ++a) {
+        gradient[a] += j[a] * e;
+        for (int b = 0; b <= a; ++b, ++k) normal[k] += j[a] * j[b];
+      }
+    }
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      sums.square += square[lane];
+      sums.inliers += static_cast<float>(inliers[lane]);
+      sums.beyond += static_cast<float>(beyond[lane]);
+      sums.expected += static_cast<float>(expected[lane]);
+      for (int a = 0, k = 0; a < unknowns; ++a) {
+        sums.gradient[a] += gradient[a][lane];
+        for (int b = 0; b <= a; ++b, ++k) sums.normal[a][b] += normal[k][lane];
+      }
+    }
+  }
+
+  TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, int unknowns, FitSums& sums) {
+    if (unknowns == 2) return fit<2>(beams, p, gate, sums);
+    if (unknowns == 3) return fit<3>(beams, p, gate, sums);
+    fit<4>(beams, p, gate, sums);
+  }
+
+  TUNNELRIG_BODY void correlate(const std::uint16_t* histogram, const std::int32_t* start,
+                                const float* weight, std::size_t cells, float* __restrict out,
+                                std::size_t size) {
+    for (std::size_t i = 0; i < size; ++i) out[i] = 0;
+    for (std::size_t k = 0; k < cells; ++k) {
+      // Walked backwards through the histogram, since a wall at Y is seen at Y − p from p.
+      const std::uint16_t* from = histogram + start[k];
+      for (std::ptrdiff_t i = 0; i < static_cast<std::ptrdiff_t>(size); ++i)
+        out[i] += weight[k] * static_cast<float>(from[-i]);
+    }
+  }
+
+  TUNNELRIG_BODY void smooth(const float* in, const float* tap, std::size_t taps, float* __restrict out,
+                             std::size_t size) {
+    std::size_t i = 0;
+    for (; i + kLanes <= size; i += kLanes) {
+      Floats sum = {};
+      for (std::size_t j = 0; j < taps; ++j) {
+        Floats value;
+        __builtin_memcpy(&value, in + i + j, sizeof value);
+        sum += tap[j] * value;
+      }
+      __builtin_memcpy(out + i, &sum, sizeof sum);
+    }
+    for (; i < size; ++i) {
+      out[i] = 0;
+      for (std::size_t j = 0; j < taps; ++j) out[i] += tap[j] * in[i + j];
+    }
+  }
+
+  TUNNELRIG_BODY float maximum(const float* in, std::size_t size) {
+    Floats most = {};
+    std::size_t i = 0;
+    for (; i + kLanes <= size; i += kLanes) {
+      Floats value;
+      __builtin_memcpy(&value, in + i, sizeof value);
+      most = value > most ? value : most;
+    }
+    float result = 0;
+    for (; i < size; ++i) result = in[i] > result ? in[i] : result;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) result = most[lane] > result ? most[lane] : result;
+    return result;
+  }
+};
+
+// One struct of functions per instruction set, each with the bodies compiled for it.
+#define TUNNELRIG_FORM(form, target)                                                                    \
+  struct form {                                                                                         \
+    target static int load(const float* range, const Beams& beams, float least, float most) {           \
+      return Body::load(range, beams, least, most);                                                     \
+    }                                                                                                   \
+    target static void project(const Beams& beams, const Projection& p) { Body::project(beams, p); }    \
+    target static void cells(const Beams& beams, float y, float z, float offset, float last,            \
+                             std::int32_t* cell) {                                                      \
+      Body::cells(beams, y, z, offset, last, cell);                                                     \
+    }                                                                                                   \
+    target static void see(const Beams& beams, std::size_t first, std::size_t last, float y, float z) { \
+      Body::see(beams, first, last, y, z);                                                              \
+    }                                                                                                   \
+    target static void fit(const Beams& beams, const Projection& p, float gate, int unknowns,           \
+                           FitSums& sums) {                                                             \
+      Body::fit(beams, p, gate, unknowns, sums);                                                        \
+    }                                                                                                   \
+    target static void correlate(const std::uint16_t* histogram, const std::int32_t* start,             \
+                                 const float* weight, std::size_t cell_count, float* out,               \
+                                 std::size_t size) {                                                    \
+      Body::correlate(histogram, start, weight, cell_count, out, size);                                 \
+    }                                                                                                   \
+    target static void smooth(const float* in, const float* tap, std::size_t taps, float* out,          \
+                              std::size_t size) {                                                       \
+      Body::smooth(in, tap, taps, out, size);                                                           \
+    }                                                                                                   \
+    target static float maximum(const float* in, std::size_t size) { return Body::maximum(in, size); }  \
+    static const BeamKernels& kernels(const char* name) {                                               \
+      static const BeamKernels all{name, load, project, cells, see, fit, correlate, smooth, maximum};   \
+      return all;                                                                                       \
+    }                                                                                                   \
+  };
+
+TUNNELRIG_FORM(Portable, )
+#if TUNNELRIG_X86
+TUNNELRIG_FORM(Avx2, [[gnu::target("avx2")]])
+TUNNELRIG_FORM(Avx512, [[gnu::target("avx512f,avx512bw,avx512dq,avx512vl")]])
+#endif
+
+}  // namespace
+
+std::vector<const BeamKernels*> all_beam_kernels() {
+  std::vector<const BeamKernels*> all{&Portable::kernels("portable")};
+#if TUNNELRIG_X86
+  if (__builtin_cpu_supports("avx2")) all.push_back(&Avx2::kernels("AVX2"));
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+      __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
+    all.push_back(&Avx512::kernels("AVX-512"));
+#endif
+  return all;
+}
+
+const BeamKernels& beam_kernels() {
+  static const BeamKernels& fastest = *all_beam_kernels().back();
+  return fastest;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,63 @@
+// The estimator in the loop: simulated LIDAR → scan matcher → Kalman filter, with the sweep's duration and the matcher's latency.
+#pragma once
+
+#include "flight/lidar/simulated_lidar.h"
+#include "flight/localisation/kalman_filter.h"
+#include "flight/localisation/scan_matcher.h"
+#include "flight/scenarios/space.h"
+#include "flight/simulation/flight.h"
+
+#include <array>
+#include <optional>
+
+namespace tunnelrig {
+
+struct LocalisationSettings {
+  LidarSettings lidar;
+  int cycles_per_scan = 10;    // 40 Hz
+  int cycles_of_latency = 4;   // from the sweep's end to the correction: transfer and matching, 10 ms; assumed
+  KinematicModel model;
+  GateSettings gate;
+};
+
+/// Positions in the flight frame (z above the floor). `space` must outlive it.
+class Localisation {
+ public:
+  Localisation(const FlightSpace& space, const LocalisationSettings& settings);
+
+  /// For the next flight; what is random in it follows from seed and stream alone.
+  void prepare(std::uint64_t seed, std::uint64_t stream);
+
+  void start(const RigidState& truth);
+  PlanarEstimate step(const EstimatorInput& in);
+  void finish(FlightScore& score) const;
+
+ private:
+  static constexpr std::size_t kRemembered = 16;  // cycles of poses, longer than a sweep
+
+  struct Moment {
+    LidarPose pose;     // true
+    Attitude measured;  // as the autopilot has it
+  };
+
+  void take_scan();
+  void correct();
+  void judge(const RigidState& truth);
+
+  double floor_m_;
+  LocalisationSettings settings_;
+  const CrossSection* section_;
+  ScanMatcher matcher_;
+  std::optional<SimulatedLidar> lidar_;
+  std::optional<KalmanFilter> filter_;
+  Scan scan_;
+  Attitude scan_attitude_;
+  std::array<Moment, kRemembered> moments_;
+  long cycle_ = 0;
+  bool waiting_ = false;
+  int matches_ = 0, rejected_ = 0;
+  double nees_sum_ = 0;
+  long nees_count_ = 0;
+};
+
+}  // namespace tunnelrig
