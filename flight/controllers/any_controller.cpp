@@ -14,7 +14,7 @@
 namespace tunnelrig {
 namespace {
 
-constexpr std::array<ControllerKind, 10> kKinds = {{
+constexpr std::array<ControllerKind, 11> kKinds = {{
     {"ibs", "integral backstepping as printed, (6.29) and (6.30)"},
     {"ibs-lyapunov", "integral backstepping with a1 = 1 + k1 + k2 k3"},
     {"pid", "ArduCopter's position cascade without velocity feed-forward"},
@@ -23,6 +23,7 @@ constexpr std::array<ControllerKind, 10> kKinds = {{
     {"ibs-map", "ibs-lyapunov with the measured map fed forward"},
     {"ibs-do", "backstepping with a disturbance observer"},
     {"indi", "incremental nonlinear dynamic inversion"},
+    {"ibs-map-off", "ibs-map with its gains and without its map", false},
     {"pid-stock", "as pid, with ArduCopter 4's gains", false},
     {"pid-ff-stock", "as pid-ff, with ArduCopter 4's gains", false},
 }};
@@ -35,7 +36,7 @@ AnyController::Variant AnyController::make(std::string_view name, const Controll
   const double full = context.full_thrust_m_s2;
   if (name == "ibs") return Ibs(IbsForm::kPrinted, {});
   if (name == "ibs-lyapunov") return Ibs(IbsForm::kLyapunov, {});
-  if (name == "ibs-map") return IbsMap({}, context);
+  if (name == "ibs-map" || name == "ibs-map-off") return IbsMap({}, context);
   if (name == "ibs-do") return IbsObserver({});
   if (name == "indi") return Indi({});
   if (name == "pid" || name == "pid-stock") return PidCascade({}, {}, full, false);
@@ -48,7 +49,7 @@ AnyController::Variant AnyController::make(std::string_view name, const Controll
 
 AnyController::AnyController(std::string_view name, const GainTable& gains, const ControllerContext& context)
     : controller_(make(name, context)) {
-  const auto table = gains.find(name);
+  const auto table = gains.find(name == "ibs-map-off" ? "ibs-map" : name);
   if (table == gains.end()) return;
   for (const NamedGain& gain : gain_list()) {
     const auto value = table->second.find(std::string(gain.name));
@@ -76,9 +77,9 @@ GainTable parse_gains(std::string_view text, const std::string& file) {
     if (name == "format") continue;
     const toml::table* table = node.as_table();
     if (table == nullptr) throw InputError::at(file, line_of(node), "{} is no table; write [{}]", name, name);
-    if (name.ends_with("-stock"))
-      throw InputError::at(file, line_of(node), "{} flies with ArduCopter's own gains; tune {}", name,
-                           name.substr(0, name.size() - 6));
+    const auto kind = std::find_if(kKinds.begin(), kKinds.end(), [&](const auto& k) { return k.name == name; });
+    if (kind != kKinds.end() && !kind->tuned)
+      throw InputError::at(file, line_of(node), "{} has no gains of its own: {}", name, kind->description);
     AnyController controller = [&] {
       try {
         return AnyController(name, {}, {});

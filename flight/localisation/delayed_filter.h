@@ -8,8 +8,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/LU>
 
 namespace tunnelrig {
 

@@ -5,143 +5,132 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <filesystem>
 #include <numbers>
 
+#include <fmt/format.h>
 #include <fmt/ranges.h>
 
 namespace tunnelrig {
 namespace {
 
+constexpr double kTurn_rad = 2 * std::numbers::pi;
 constexpr std::array<std::string_view, 6> kNames = {"hover",  "diagonal",  "ladder",
-                                                    "circle", "waypoints", "figure"};
-constexpr double kSettle_s = 5;  // at rest before anything moves
+                                                    "circle", "waypoints", "training"};
 
-/// Room of the vehicle's centre on either side of the middle.
+/// Where the centre of the vehicle can be: ± reach about the middle of the bounding box.
 struct Room {
-  Plane middle_m, half_m;
+  Plane middle, reach;
+  Plane at(double y_norm, double z_norm) const {
+    return {middle[0] + y_norm * reach[0], middle[1] + z_norm * reach[1]};
+  }
 };
 
-Room room(const FlightSpace& space, const Airframe& frame) {
-  const SectionScale scale = space.scale(frame);
-  return {space.middle_m(), {scale.half_span_y_m, scale.half_span_z_m}};
+/// Upper left corner to the lower right one and back with ±0.1 m/s² (6.3, Figure 6.8).
+Trajectory diagonal(const Room& room) {
+  Trajectory path;
+  path.hold(room.at(-0.7, 0.7), 3);
+  path.move(room.at(0.7, -0.7), 0.1);
+  path.hold(room.at(0.7, -0.7), 3);
+  path.move(room.at(-0.7, 0.7), 0.1);
+  path.hold(room.at(-0.7, 0.7), 3);
+  return path;
 }
 
-bool is_small_tunnel(const Room& room) { return room.half_m[0] < 0.6; }
-
-Scenario hover(const Room& room) {
-  Scenario s{.name = "hover", .score_from_s = kSettle_s};
-  s.trajectory.hold(room.middle_m, 35);
-  return s;
-}
-
-/// From the upper left to the lower right and back at ±0.1 m/s² (6.8); 6.9 prints no lengths.
-Scenario diagonal(const Room& room) {
-  Scenario s{.name = "diagonal", .score_from_s = kSettle_s};
-  const Plane to = {0.65 * room.half_m[0], 0.6 * room.half_m[1]};
-  const Plane high = {room.middle_m[0] - to[0], room.middle_m[1] + to[1]};
-  const Plane low = {room.middle_m[0] + to[0], room.middle_m[1] - to[1]};
-  s.trajectory.hold(high, kSettle_s);
-  for (int i = 0; i < 2; ++i) {
-    s.trajectory.move(low, 0.1);
-    s.trajectory.hold(low, 2);
-    s.trajectory.move(high, 0.1);
-    s.trajectory.hold(high, 2);
+/// y = 290 mm; height changes at 15 s and 30 s with 0.2 m/s² (6.3.2.1). The heights themselves are not
+/// printed.
+Trajectory ladder(const Room& room) {
+  const double y = std::min(0.29, 0.8 * room.reach[0]);
+  const std::array<double, 3> heights = {room.at(0, -0.5)[1], room.middle[1], room.at(0, 0.5)[1]};
+  Trajectory path;
+  path.hold({y, heights[0]}, 15);
+  for (std::size_t i = 1; i < heights.size(); ++i) {
+    const double begun_s = path.duration_s();
+    path.move({y, heights[i]}, 0.2);
+    path.hold({y, heights[i]}, begun_s + 15 - path.duration_s());
   }
-  return s;
+  return path;
 }
 
-/// At y = 290 mm, heights changed with 0.2 m/s² at about 15 s and 30 s (6.13); the heights are not printed.
-Scenario ladder(const Room& room) {
-  Scenario s{.name = "ladder", .score_from_s = kSettle_s};
-  const double y = room.middle_m[0] + 0.29, step = 0.5 * room.half_m[1];
-  s.trajectory.hold({y, room.middle_m[1] - step}, 15);
-  s.trajectory.move({y, room.middle_m[1]}, 0.2);
-  s.trajectory.hold({y, room.middle_m[1]}, 30 - s.trajectory.duration_s());
-  s.trajectory.move({y, room.middle_m[1] + step}, 0.2);
-  s.trajectory.hold({y, room.middle_m[1] + step}, 45 - s.trajectory.duration_s());
-  return s;
+/// (6.31) and (6.32), whose t is in milliseconds; five turns. Other tunnels: what fits, as fast.
+Scenario circle(const std::string& tunnel, const Room& room) {
+  double radius_m = 0.8 * std::min(room.reach[0], room.reach[1]), rate = 0.44 / radius_m;
+  Plane centre = room.middle;
+  if (tunnel == "2.4") radius_m = 0.7, rate = 0.1 * kTurn_rad, centre = {0, 0.9};
+  if (tunnel == "1.5") radius_m = 0.3, rate = 0.23 * kTurn_rad, centre = {0, 0.65};
+  Scenario scenario{.score_from_s = kTurn_rad / rate};
+  scenario.trajectory.circle(centre, radius_m, rate, 5);
+  return scenario;
 }
 
-/// (6.31) and (6.32) with t in seconds: as printed, in milliseconds, they would turn a thousand times as
-/// fast.
-Scenario circle(const Room& room) {
-  constexpr double kPi = std::numbers::pi;
-  const bool small = is_small_tunnel(room);
-  const double radius = small ? 0.3 : 0.7, height = small ? 0.65 : 0.9, rate = small ? 0.46 * kPi : 0.2 * kPi;
-  const double turn_s = 2 * kPi / rate, turns = small ? 8 : 5;
-  Scenario s{.name = "circle"};
-  s.trajectory.hold({0, height + radius}, kSettle_s);
-  s.trajectory.circle({0, height}, radius, rate, turns);
-  s.score_from_s = kSettle_s + turn_s;  // after the first turn
-  return s;
-}
-
-/// Section 6.3.3; the way between waypoints is the autopilot's, here with 0.2 m/s² and 0.5 m/s.
-Scenario waypoints(const Room& room) {
-  Scenario s{.name = "waypoints", .score_from_s = kSettle_s};
-  const double scale = std::min(1.0, 0.8 * room.half_m[0]);
-  const Plane home = {0, 0.6}, crack = {scale, 1.1},
-              above = {scale, std::min(1.5, room.middle_m[1] + 0.8 * room.half_m[1])};
-  s.trajectory.hold(home, 10);
-  for (const Plane& point : {crack, above, home}) {
-    s.trajectory.move(point, 0.2, 0.5);
-    s.trajectory.hold(point, 8);
+/// (0, .6) → (1, 1.1) → (1, 1.5) → (0, .6) m (6.3.3); where the tunnel does not hold that, the same figure as
+/// far as it does.
+Trajectory waypoints(const Room& room) {
+  std::array<Plane, 4> points = {{{0, 0.6}, {1, 1.1}, {1, 1.5}, {0, 0.6}}};
+  if (room.reach[0] < 1.1)
+    points = {{room.at(0, -0.6), room.at(0.7, 0), room.at(0.7, 0.5), room.at(0, -0.6)}};
+  Trajectory path;
+  path.hold(points[0], 5);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    path.move(points[i], 0.2, 0.4);
+    path.hold(points[i], 5);
   }
-  return s;
+  return path;
 }
 
-/// A Lissajous figure through all quarters, with other frequencies than the circles; after a hover.
-Scenario figure(const Room& room) {
-  Scenario s{.name = "figure", .score_from_s = kSettle_s};
-  const Plane amplitude = {0.55 * room.half_m[0], 0.45 * room.half_m[1]};
-  s.trajectory.hold({room.middle_m[0], room.middle_m[1] + amplitude[1]}, kSettle_s);
-  s.trajectory.figure(room.middle_m, amplitude, {0.8, 1.1}, 30);
-  return s;
+/// Five seconds of hover and a figure through all quarters of the tunnel, like none of the paths that are
+/// compared.
+Trajectory training(const Room& room) {
+  Trajectory path;
+  path.hold(room.at(0, 0.6), 5);
+  path.figure(room.middle, {0.6 * room.reach[0], 0.6 * room.reach[1]}, {kTurn_rad / 5, kTurn_rad / 8}, 25);
+  return path;
 }
 
 }  // namespace
 
 std::span<const std::string_view> scenario_names() { return kNames; }
 
-Scenario scenario_from(const std::string& name_or_file, const FlightSpace& space, const Airframe& frame) {
-  const Room r = room(space, frame);
-  if (name_or_file == "hover") return hover(r);
-  if (name_or_file == "diagonal") return diagonal(r);
-  if (name_or_file == "ladder") return ladder(r);
-  if (name_or_file == "circle") return circle(r);
-  if (name_or_file == "waypoints") return waypoints(r);
-  if (name_or_file == "figure") return figure(r);
-  if (!std::filesystem::exists(name_or_file))
-    throw InputError(fmt::format("no scenario and no file is called '{}'; there are {}", name_or_file,
-                                 fmt::join(kNames, ", ")));
-  return parse_scenario(read_text(name_or_file), name_or_file);
-}
-
-std::string tunnel_of_scenario(const std::string& name_or_file) {
-  if (name_or_file == "waypoints") return "railway";
-  if (std::find(kNames.begin(), kNames.end(), name_or_file) != kNames.end()) return "1.5";
-  if (!std::filesystem::exists(name_or_file)) return "1.5";
-  const std::string tunnel = parse_scenario(read_text(name_or_file), name_or_file).tunnel;
-  return tunnel.empty() ? "1.5" : tunnel;
+Scenario scenario_from(const std::string& name, const FlightSpace& space, const Airframe& frame) {
+  const SectionScale scale = space.scale(frame);
+  const Room room{space.middle_m(), {scale.half_span_y_m, scale.half_span_z_m}};
+  Scenario scenario;
+  if (name == "hover") {
+    scenario.trajectory.hold(room.middle, 30);
+  } else if (name == "diagonal") {
+    scenario.trajectory = diagonal(room);
+  } else if (name == "ladder") {
+    scenario.trajectory = ladder(room);
+  } else if (name == "circle") {
+    scenario = circle(space.tunnel.name, room);
+  } else if (name == "waypoints") {
+    scenario.trajectory = waypoints(room);
+  } else if (name == "training") {
+    scenario.trajectory = training(room);
+  } else if (std::filesystem::is_regular_file(name)) {
+    scenario = parse_scenario(read_text(name), name);
+  } else {
+    throw InputError(
+        fmt::format("no scenario {}: neither a file nor one of {}", name, fmt::join(kNames, ", ")));
+  }
+  if (scenario.name.empty()) scenario.name = name;
+  check_scenario(scenario, space, frame);
+  return scenario;
 }
 
 void check_scenario(const Scenario& scenario, const FlightSpace& space, const Airframe& frame) {
   constexpr double kStep_s = 0.02;
-  const double duration = scenario.trajectory.duration_s();
-  const auto steps = static_cast<long>(duration / kStep_s);
+  const auto steps = static_cast<long>(std::ceil(scenario.trajectory.duration_s() / kStep_s));
   for (long i = 0; i <= steps; ++i) {
     const double t = static_cast<double>(i) * kStep_s;
-    const Plane p = scenario.trajectory.at(t).position_m;
-    const bool in = space.walls.inside(p);
-    const Touch touch = in ? find_touch(space.walls, frame, p[0], p[1], 0, 1) : Touch{};
-    if (in && touch.depth_m <= 0) continue;
+    const Plane at = scenario.trajectory.at(t).position_m;
+    if (space.walls.inside(at) && find_touch(space.walls, frame, at[0], at[1], 0, 1).depth_m <= 0) continue;
     throw InputError::in(
         "scenario " + scenario.name,
-        "{} tunnel {} at {:.2f} s: the vehicle's centre would be at ({:.3f}, {:.3f}) m and {}",
-        i == 0 ? "starts inside a wall of" : "leaves", space.tunnel.name, t, p[0], p[1],
-        in ? fmt::format("the vehicle {:.0f} mm in the wall near ({:.3f}, {:.3f}) m", 1000 * touch.depth_m,
-                         touch.at[0], touch.at[1])
-           : std::string("outside of it"));
+        "{} at y = {:.3f} m, {:.3f} m above the floor{} (the vehicle is {:.3f} m wide, {:.3f} m high)",
+        i > 0 ? "it leaves the tunnel" : "it starts inside a wall", at[0], at[1],
+        i > 0 ? fmt::format(", t = {:.2f} s", t) : "", frame.width_m, frame.height_m);
   }
 }
 

@@ -7,105 +7,93 @@
 namespace tunnelrig {
 namespace {
 
-/// Two columns see upright and level walls only; a section with any other needs all directions.
-HoughForm form_for(const Tunnel& tunnel) {
-  if (tunnel.circle_diameter_m > 0) return HoughForm::circle;
-  const auto corners = tunnel.section.vertices();
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const SectionPoint along = corners[(i + 1) % corners.size()] - corners[i];
-    if (std::min(std::abs(along.x()), std::abs(along.y())) > 1e-6) return HoughForm::all_directions;
-  }
-  return HoughForm::two_columns;
-}
-
-MatcherSettings matcher_settings(const FlightSpace& space, const LidarSettings& lidar) {
+MatcherSettings matcher_settings(const Tunnel& tunnel, const LidarSettings& lidar) {
   MatcherSettings settings;
   settings.layout = lidar.layout;
-  settings.least_range_m = lidar.least_range_m;
-  settings.most_range_m = lidar.most_range_m;
-  settings.form = form_for(space.tunnel);
-  settings.circle_diameter_m = space.tunnel.circle_diameter_m;
+  if (tunnel.circle_diameter_m > 0) {
+    settings.form = HoughForm::circle;
+    settings.circle_diameter_m = tunnel.circle_diameter_m;
+  } else if (tunnel.section.vertices().size() > 4) {
+    settings.form = HoughForm::all_directions;
+  }
   return settings;
-}
-
-Attitude lidar_attitude(const EulerAngles& angles) {
-  return {angles.roll_rad, angles.pitch_rad, angles.yaw_rad};
 }
 
 }  // namespace
 
-Localisation::Localisation(const FlightSpace& space, const LocalisationSettings& settings,
-                           const FlightSetup& setup)
-    : settings_(settings),
-      floor_m_(space.floor_m),
-      lidar_(space.tunnel.section, settings.lidar, Random(setup.seed, 4 * setup.stream + 2).bits()),
-      matcher_(space.tunnel.section, matcher_settings(space, settings.lidar)),
-      filter_(Eigen::Vector2d::Zero(), settings.model) {}
+Localisation::Localisation(const FlightSpace& space, const LocalisationSettings& settings)
+    : floor_m_(space.floor_m),
+      settings_(settings),
+      section_(&space.tunnel.section),
+      matcher_(space.tunnel.section, matcher_settings(space.tunnel, settings.lidar)) {}
 
-SectionPoint Localisation::in_section(const RigidState& truth) const {
-  return {truth.position_m[1], truth.position_m[2] + floor_m_};
-}
-
-LidarPose Localisation::pose(const EstimatorInput& in) const {
-  return {in_section(*in.truth), lidar_attitude(euler_angles(in.truth->attitude))};
+void Localisation::prepare(std::uint64_t seed, std::uint64_t stream) {
+  lidar_.emplace(*section_, settings_.lidar, Random(seed, 4 * stream + 3).bits());
 }
 
 void Localisation::start(const RigidState& truth) {
-  filter_ = AugmentedFilter(in_section(truth), settings_.model);
-  pending_ = {};
-  in_sweep_ = false;
-  first_ = true;
-  next_sweep_s_ = 1 / settings_.lidar.rate_hz;
-}
-
-void Localisation::scan(const EstimatorInput& in) {
-  const Scan sweep = lidar_.sweep(sweep_start_, pose(in));
-  const Match match = matcher_.match(sweep, lidar_attitude(in.attitude), filter_.position_m());
-  ++matches_;
-  if (!match.accepted) {
-    ++rejected_;
-    return;
-  }
-  // The beams were measured over the sweep: what they show is where the vehicle was at its middle.
-  pending_ = {match.position_m, match.covariance_m2, in.time_s - 0.5 * settings_.lidar.sweep_s,
-              in.time_s + settings_.latency_s, true};
+  if (!lidar_) prepare(0, 0);
+  filter_.emplace(Eigen::Vector2d(truth.position_m[1], truth.position_m[2] + floor_m_), settings_.model, settings_.gate);
+  cycle_ = nees_count_ = 0;
+  matches_ = rejected_ = 0;
+  nees_sum_ = 0;
+  waiting_ = false;
 }
 
 PlanarEstimate Localisation::step(const EstimatorInput& in) {
-  if (!first_) {
-    AugmentedModel::Input input;
-    input.modelled_m_s2 = Eigen::Vector2d(in.modelled_m_s2[0], in.modelled_m_s2[1]);
-    input.measured_m_s2 = Eigen::Vector2d(in.acceleration_m_s2[0], in.acceleration_m_s2[1]);
-    filter_.predict(input, kControlStep_s);
+  const RigidState& truth = *in.truth;
+  const EulerAngles true_angles = euler_angles(truth.attitude);
+  moments_[static_cast<std::size_t>(cycle_) % kRemembered] = {
+      {{truth.position_m[1], truth.position_m[2] + floor_m_},
+       {true_angles.roll_rad, true_angles.pitch_rad, true_angles.yaw_rad}},
+      {in.attitude.roll_rad, in.attitude.pitch_rad, in.attitude.yaw_rad}};
+  if (cycle_ > 0) filter_->predict({in.acceleration_m_s2[0], in.acceleration_m_s2[1]}, kControlStep_s);
+  const long phase = cycle_ % settings_.cycles_per_scan;
+  if (cycle_ >= settings_.cycles_per_scan && phase == 0) take_scan();
+  if (waiting_ && phase == settings_.cycles_of_latency) correct();
+  ++cycle_;
+  judge(truth);
+  const Eigen::Vector2d position = filter_->position_m(), velocity = filter_->velocity_m_s();
+  return {{position.x(), position.y() - floor_m_}, {velocity.x(), velocity.y()}};
+}
+
+void Localisation::take_scan() {
+  const auto cycles = static_cast<long>(std::lround(settings_.lidar.sweep_s / kControlStep_s));
+  const auto at = [&](long cycle) -> const Moment& { return moments_[static_cast<std::size_t>(cycle) % kRemembered]; };
+  scan_ = lidar_->sweep(at(cycle_ - cycles).pose, at(cycle_).pose);
+  // Motion within the sweep is small and nearly uniform: the scan counts as taken in its middle.
+  const Attitude &from = at(cycle_ - cycles).measured, &to = at(cycle_).measured;
+  scan_attitude_ = {0.5 * (from.roll_rad + to.roll_rad), 0.5 * (from.pitch_rad + to.pitch_rad),
+                    0.5 * (from.yaw_rad + to.yaw_rad)};
+  waiting_ = true;
+}
+
+void Localisation::correct() {
+  waiting_ = false;
+  const Match match = matcher_.match(scan_, scan_attitude_, filter_->position_m());
+  ++matches_;
+  bool used = match.accepted;
+  if (used) {
+    const double age_s = settings_.cycles_of_latency * kControlStep_s + 0.5 * settings_.lidar.sweep_s;
+    used = filter_->correct(match.position_m, match.covariance_m2, age_s).accepted;
   }
-  first_ = false;
-  constexpr double kHalfStep_s = 0.5 * kControlStep_s;
-  if (!in_sweep_ && in.time_s >= next_sweep_s_ - settings_.lidar.sweep_s - kHalfStep_s) {
-    sweep_start_ = pose(in);
-    in_sweep_ = true;
-  }
-  if (in_sweep_ && in.time_s >= next_sweep_s_ - kHalfStep_s) {
-    scan(in);
-    in_sweep_ = false;
-    next_sweep_s_ += 1 / settings_.lidar.rate_hz;
-  }
-  if (pending_.waits && in.time_s >= pending_.due_s - kHalfStep_s) {
-    if (!filter_.correct(pending_.position_m, pending_.covariance_m2, in.time_s - pending_.taken_s).accepted)
-      ++rejected_;
-    pending_.waits = false;
-    const Eigen::Vector2d error = filter_.position_m() - in_section(*in.truth);
-    const Eigen::Matrix2d covariance = filter_.covariance().topLeftCorner<2, 2>();
-    nees_sum_ += error.dot(covariance.inverse() * error);
-    ++nees_count_;
-  }
-  const Eigen::Vector2d p = filter_.position_m(), v = filter_.velocity_m_s();
-  return {{p.x(), p.y() - floor_m_}, {v.x(), v.y()}};
+  if (!used) ++rejected_;
+}
+
+/// Normalised estimation error squared of position and velocity: 4 on average for an honest filter.
+void Localisation::judge(const RigidState& truth) {
+  if (cycle_ % settings_.cycles_per_scan != 0) return;
+  const auto& v = truth.velocity_m_s;
+  const Eigen::Vector4d error =
+      Eigen::Vector4d(truth.position_m[1], truth.position_m[2] + floor_m_, v[1], v[2]) - filter_->state();
+  nees_sum_ += error.dot(filter_->covariance().inverse() * error);
+  ++nees_count_;
 }
 
 void Localisation::finish(FlightScore& score) const {
+  score.nees = nees_count_ > 0 ? nees_sum_ / static_cast<double>(nees_count_) : 0;
   score.matches = matches_;
   score.rejected_matches = rejected_;
-  score.nees = nees_count_ > 0 ? nees_sum_ / static_cast<double>(nees_count_) : 0;
 }
 
 template FlightScore fly<Localisation>(const FlightSetup&, Localisation&, AnyController&, FlightLog*);

@@ -1,5 +1,4 @@
-// The localisation in the loop: simulated LIDAR → Hough scan matcher → Kalman filter, as an estimator of
-// flight.h.
+// The estimator in the loop: simulated LIDAR → scan matcher → Kalman filter, with the sweep's duration and the matcher's latency.
 #pragma once
 
 #include "flight/lidar/simulated_lidar.h"
@@ -8,45 +7,54 @@
 #include "flight/scenarios/space.h"
 #include "flight/simulation/flight.h"
 
+#include <array>
+#include <optional>
+
 namespace tunnelrig {
 
 struct LocalisationSettings {
   LidarSettings lidar;
-  double latency_s = 0.0075;  // from the last beam to the correction
-  AugmentedModel model;
+  int cycles_per_scan = 10;    // 40 Hz
+  int cycles_of_latency = 4;   // from the sweep's end to the correction: transfer and matching, 10 ms; assumed
+  KinematicModel model;
+  GateSettings gate;
 };
 
+/// Positions in the flight frame (z above the floor). `space` must outlive it.
 class Localisation {
  public:
-  /// `space` must outlive it. The LIDAR's noise belongs to the setup's seed and stream.
-  Localisation(const FlightSpace& space, const LocalisationSettings& settings, const FlightSetup& setup);
+  Localisation(const FlightSpace& space, const LocalisationSettings& settings);
+
+  /// For the next flight; what is random in it follows from seed and stream alone.
+  void prepare(std::uint64_t seed, std::uint64_t stream);
 
   void start(const RigidState& truth);
   PlanarEstimate step(const EstimatorInput& in);
   void finish(FlightScore& score) const;
 
  private:
-  /// A match on its way to the filter.
-  struct Pending {
-    Eigen::Vector2d position_m{0, 0};
-    Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
-    double taken_s = 0, due_s = 0;
-    bool waits = false;
+  static constexpr std::size_t kRemembered = 16;  // cycles of poses, longer than a sweep
+
+  struct Moment {
+    LidarPose pose;     // true
+    Attitude measured;  // as the autopilot has it
   };
 
-  void scan(const EstimatorInput& in);
-  LidarPose pose(const EstimatorInput& in) const;
-  SectionPoint in_section(const RigidState& truth) const;
+  void take_scan();
+  void correct();
+  void judge(const RigidState& truth);
 
-  LocalisationSettings settings_;
   double floor_m_;
-  SimulatedLidar lidar_;
+  LocalisationSettings settings_;
+  const CrossSection* section_;
   ScanMatcher matcher_;
-  AugmentedFilter filter_;
-  Pending pending_;
-  LidarPose sweep_start_;
-  double next_sweep_s_ = 0;  // when its last beam is measured
-  bool in_sweep_ = false, first_ = true;
+  std::optional<SimulatedLidar> lidar_;
+  std::optional<KalmanFilter> filter_;
+  Scan scan_;
+  Attitude scan_attitude_;
+  std::array<Moment, kRemembered> moments_;
+  long cycle_ = 0;
+  bool waiting_ = false;
   int matches_ = 0, rejected_ = 0;
   double nees_sum_ = 0;
   long nees_count_ = 0;

@@ -1,195 +1,201 @@
 #include "flight/simulation/monte_carlo.h"
 
-#include <array>
+#include "datasets/error.h"
+
+#include <atomic>
 #include <cmath>
+#include <exception>
 #include <mutex>
 #include <thread>
 
 namespace tunnelrig {
 namespace {
 
-/// The truth of one run. The setup points into it, so it stays where it is.
-struct RunTruth {
-  DisturbanceField field, map;
-  FlightSetup setup;
+/// 97.5 % point of Student's t, within 1 % from three degrees of freedom on (Cornish and Fisher's expansion).
+double student_975(int degrees) {
+  if (degrees == 1) return 12.706;
+  if (degrees == 2) return 4.303;
+  const double z = 1.959964, n = degrees, z2 = z * z;
+  return z + z * (z2 + 1) / (4 * n) + z * (5 * z2 * z2 + 16 * z2 + 3) / (96 * n * n) +
+         z * (3 * z2 * z2 * z2 + 19 * z2 * z2 + 17 * z2 - 15) / (384 * n * n * n);
+}
 
-  RunTruth(const Programme& p, int run);
-  RunTruth(const RunTruth&) = delete;
-  RunTruth& operator=(const RunTruth&) = delete;
+/// One worker's vehicle, field, estimator and controller; run() may be called for any runs in any order.
+class Worker {
+ public:
+  Worker(const FlightTask& task, const DisturbanceField* map, std::string_view controller, const GainTable& gains)
+      : task_(task), map_(map) {
+    setup_.believed = task.believed;
+    setup_.map = map;
+    setup_.walls = &task.space->walls;
+    setup_.scale = task.space->scale(task.believed);
+    setup_.trajectory = &task.scenario->trajectory;
+    setup_.score_from_s = task.scenario->score_from_s;
+    setup_.seed = task.seed;
+    controller_.emplace(controller, gains, controller_context(setup_, map_share(controller)));
+    if (task.localisation) localisation_.emplace(*task.space, *task.localisation);
+  }
+
+  FlightScore run(int number, FlightLog* log) {
+    draw(static_cast<std::uint64_t>(number));
+    if (localisation_) {
+      localisation_->prepare(setup_.seed, setup_.stream);
+      return fly(setup_, *localisation_, *controller_, log);
+    }
+    GivenPosition given;
+    return fly(setup_, given, *controller_, log);
+  }
+
+ private:
+  static double map_share(std::string_view controller) { return controller == "ibs-map-off" ? 0 : 1; }
+
+  void draw(std::uint64_t number) {
+    Random random(task_.seed, 4 * number + 2);
+    const Spread& spread = task_.spread;
+    const HiddenTruth& hidden = task_.hidden;
+    setup_.stream = number;
+    setup_.vehicle = task_.believed;
+    setup_.vehicle.mass_kg *= 1 + spread.mass * random.normal();
+    setup_.vehicle.mass_kg += hidden.payload_kg;
+    for (double& scale : setup_.rotor_scale) scale = 1 + spread.rotor_thrust * random.normal();
+    setup_.rotor_scale[static_cast<std::size_t>(hidden.weak_rotor - 1)] *= 1 - hidden.motor_loss;
+    setup_.inertial.roll_error_rad = spread.roll_error_rad * random.normal();
+    for (double& bias : setup_.inertial.accelerometer_bias_m_s2) bias = spread.accelerometer_bias_m_s2 * random.normal();
+    setup_.air = task_.air;
+    setup_.air.wind_m_s += hidden.wind_m_s;
+    if (task_.map == nullptr) return;
+    const double thrust_error = spread.map_errors * random.normal(), uneven_error = spread.map_errors * random.normal();
+    if (spread.map_errors == 0 && hidden.map_scale == 1) {
+      setup_.field = map_;
+      return;
+    }
+    field_ = DisturbanceField(*task_.map, hidden.map_scale, thrust_error, uneven_error);
+    setup_.field = &field_;
+  }
+
+  const FlightTask& task_;
+  const DisturbanceField* map_;
+  FlightSetup setup_;
+  DisturbanceField field_;
+  std::optional<AnyController> controller_;
+  std::optional<Localisation> localisation_;
 };
 
-RunTruth::RunTruth(const Programme& p, int run) : map(p.map) {
-  Random random(p.seed, 4 * static_cast<std::uint64_t>(run) + 3);
-  const auto draw = [&](double deviation) { return run == 0 ? 0 : deviation * random.normal(); };
-  setup.believed = p.believed;
-  setup.vehicle = p.believed;
-  setup.vehicle.mass_kg *= 1 + draw(p.spread.mass);
-  setup.vehicle.motor_lag_s *= std::max(0.5, 1 + draw(p.spread.motor_lag));
-  for (double& scale : setup.rotor_scale) scale = 1 + draw(p.spread.rotor_thrust);
-  const double map_scale = 1 + draw(p.spread.map_scale);
-  const double thrust_error = draw(p.spread.map_uncertainties),
-               uneven_error = draw(p.spread.map_uncertainties);
-  setup.inertial.roll_error_rad = draw(p.spread.roll_error_rad);
-  for (double& bias : setup.inertial.accelerometer_bias_m_s2) bias = draw(p.spread.accelerometer_m_s2);
-
-  setup.vehicle.mass_kg += p.undeclared.payload_kg;
-  if (p.undeclared.weak_motor > 0)
-    setup.rotor_scale[static_cast<std::size_t>(p.undeclared.weak_motor - 1)] *=
-        1 - p.undeclared.weak_motor_loss;
-  field = DisturbanceField(p.map, map_scale * p.undeclared.map_scale, thrust_error, uneven_error);
-  setup.field = &field;
-  setup.map = &map;
-  setup.walls = &p.space->walls;
-  setup.scale = p.space->scale(p.believed);
-  setup.trajectory = &p.scenario.trajectory;
-  setup.score_from_s = p.scenario.score_from_s;
-  setup.air = p.air;
-  setup.air.wind_m_s += p.undeclared.wind_m_s;
-  setup.seed = p.seed;
-  setup.stream = static_cast<std::uint64_t>(run);
+RunResult result_of(const FlightScore& score) {
+  return {.rms_y_m = score.tracking[0].rms_m(),
+          .rms_z_m = score.tracking[1].rms_m(),
+          .largest_y_m = score.tracking[0].largest_m(),
+          .largest_z_m = score.tracking[1].largest_m(),
+          .estimator_rms_m = std::hypot(score.estimator[0].rms_m(), score.estimator[1].rms_m()) / std::sqrt(2.0),
+          .nees = score.nees,
+          .effort_N = score.effort_N,
+          .saturated_s = score.saturated_s,
+          .clamped_s = score.clamped_s,
+          .contacts = score.contact_count,
+          .matches = score.matches,
+          .rejected_matches = score.rejected_matches,
+          .lost = score.lost,
+          .touched = score.contacts};
 }
 
-RunResult condense(const FlightScore& score) {
-  RunResult r;
-  for (std::size_t i = 0; i < 2; ++i) {
-    r.squares_m2[i] = std::pow(score.tracking[i].rms_m(), 2);
-    r.largest_m[i] = score.tracking[i].largest_m();
-    r.estimator_squares_m2[i] = std::pow(score.estimator[i].rms_m(), 2);
+void summarise(Comparison& all) {
+  const auto n = static_cast<double>(all.runs.size());
+  double y2 = 0, z2 = 0, e2 = 0, mean = 0, squares = 0, matches = 0, rejected = 0;
+  for (const RunResult& run : all.runs) {
+    y2 += run.rms_y_m * run.rms_y_m / n;
+    z2 += run.rms_z_m * run.rms_z_m / n;
+    e2 += run.estimator_rms_m * run.estimator_rms_m / n;
+    mean += run.rms_m() / n;
+    all.largest_y_m = std::max(all.largest_y_m, run.largest_y_m);
+    all.largest_z_m = std::max(all.largest_z_m, run.largest_z_m);
+    all.contacts += run.contacts;
+    all.runs_with_contact += run.contacts > 0 ? 1 : 0;
+    all.lost += run.lost ? 1 : 0;
+    all.nees += run.nees / n;
+    all.effort_N += run.effort_N / n;
+    all.saturated_s += run.saturated_s / n;
+    all.clamped_s += run.clamped_s / n;
+    matches += run.matches;
+    rejected += run.rejected_matches;
+    if (!run.touched.empty() && (!all.first_contact_s || run.touched[0].time_s < *all.first_contact_s))
+      all.first_contact_s = run.touched[0].time_s;
   }
-  r.contacts = score.contact_count;
-  if (!score.contacts.empty()) r.first_contact = score.contacts.front();
-  r.effort_N = score.effort_N;
-  r.saturated_s = score.saturated_s;
-  r.clamped_s = score.clamped_s;
-  r.nees = score.nees;
-  r.matches = score.matches;
-  r.rejected_matches = score.rejected_matches;
-  r.lost = score.lost;
-  return r;
+  for (const RunResult& run : all.runs) squares += (run.rms_m() - mean) * (run.rms_m() - mean);
+  const double half = n > 1 ? student_975(static_cast<int>(n) - 1) * std::sqrt(squares / (n - 1) / n) : 0;
+  all.rms_y_m = std::sqrt(y2);
+  all.rms_z_m = std::sqrt(z2);
+  all.estimator_rms_m = std::sqrt(e2);
+  all.ci95_low_m = std::max(mean - half, 0.0);
+  all.ci95_high_m = mean + half;
+  all.rejected_share = matches > 0 ? rejected / matches : 0;
 }
 
-/// One flight, into its place of the result.
-void fly_one(const Programme& p, int run, ControllerResult& result, std::mutex& pooling) {
-  const RunTruth truth(p, run);
-  AnyController controller(result.name, p.gains, controller_context(truth.setup, p.map_share));
-  FlightLog* log = p.keep_logs && run == 0 ? &result.log : nullptr;
-  FlightScore score;
-  if (p.position_given) {
-    GivenPosition given;
-    score = fly(truth.setup, given, controller, log);
-  } else {
-    Localisation localisation(*p.space, p.localisation, truth.setup);
-    score = fly(truth.setup, localisation, controller, log);
-  }
-  result.runs[static_cast<std::size_t>(run)] = condense(score);
-  if (run == 0) result.contacts = score.contacts;
-  // Of what is pooled here only counts are used, which do not depend on the order.
-  const std::scoped_lock lock(pooling);
-  for (std::size_t i = 0; i < 2; ++i) result.pooled[i].add(score.tracking[i]);
+DisturbanceField field_of(const FlightTask& task) {
+  return task.map == nullptr ? DisturbanceField() : DisturbanceField(*task.map);
 }
 
 }  // namespace
 
-std::vector<ControllerResult> fly_programme(const Programme& p, const Progress& progress) {
-  std::vector<ControllerResult> results(p.controllers.size());
-  for (std::size_t c = 0; c < results.size(); ++c) {
-    results[c].name = p.controllers[c];
-    results[c].runs.resize(static_cast<std::size_t>(p.runs));
-    AnyController(results[c].name, p.gains, {});  // an unknown name is refused before anything flies
-  }
-  const int total = p.runs * static_cast<int>(results.size());
-  std::atomic<int> next{0}, done{0};
-  std::mutex pooling, failing;
-  std::exception_ptr failure;
-  const auto work = [&](bool reports) {
-    for (int task = next++; task < total; task = next++) {
-      try {
-        ControllerResult& result = results[static_cast<std::size_t>(task) % results.size()];
-        fly_one(p, task / static_cast<int>(results.size()), result, pooling);
-      } catch (...) {
-        const std::scoped_lock lock(failing);
-        failure = std::current_exception();
-        next = total;
+double RunResult::rms_m() const { return std::hypot(rms_y_m, rms_z_m); }
+
+void HiddenTruth::validate() const {
+  const auto require = [](bool holds, const char* name, double value, const char* rule) {
+    if (!holds) throw InputError::in("hidden truth", "{} = {:g}: {}", name, value, rule);
+  };
+  require(payload_kg >= 0 && payload_kg <= 2, "payload_kg", payload_kg, "must be from 0 to 2");
+  require(map_scale >= -5 && map_scale <= 5, "map_scale", map_scale, "must be from -5 to 5");
+  require(std::abs(wind_m_s) <= 15, "wind_m_s", wind_m_s, "must be from -15 to 15");
+  require(motor_loss >= 0 && motor_loss <= 0.3, "motor_loss", motor_loss, "must be from 0 to 0.3");
+  require(weak_rotor >= 1 && weak_rotor <= 4, "weak_rotor", weak_rotor, "must be from 1 to 4");
+}
+
+Comparison fly_runs(const FlightTask& task, std::string_view controller, const GainTable& gains,
+                    const std::function<void(int)>& progress) {
+  const DisturbanceField map = field_of(task);
+  Comparison all{.controller = std::string(controller)};
+  all.runs.resize(static_cast<std::size_t>(task.runs));
+  std::array<AxisErrors, 2> pooled;
+  std::atomic<int> next = 0;
+  std::mutex mutex;
+  std::exception_ptr failed;
+  int done = 0;
+  const auto work = [&] {
+    try {
+      Worker worker(task, &map, controller, gains);
+      for (int run = next++; run < task.runs; run = next++) {
+        const FlightScore score = worker.run(run, nullptr);
+        const std::scoped_lock lock(mutex);
+        all.runs[static_cast<std::size_t>(run)] = result_of(score);
+        // Counts do not care in which order they are added; everything else is added up in the order of the runs.
+        for (std::size_t i = 0; i < 2; ++i) pooled[i].add(score.tracking[i]);
+        if (progress) progress(++done);
       }
-      ++done;
-      if (reports && progress) progress(done, total);
+    } catch (...) {
+      const std::scoped_lock lock(mutex);
+      failed = std::current_exception();
+      next = task.runs;
     }
   };
-  std::vector<std::jthread> others;
-  for (int i = 1; i < p.threads; ++i) others.emplace_back(work, false);
-  work(true);
-  others.clear();  // joins
-  if (failure) std::rethrow_exception(failure);
-  return results;
+  const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  const int workers = std::min(task.workers > 0 ? task.workers : cores, task.runs);
+  std::vector<std::thread> threads;
+  for (int i = 1; i < workers; ++i) threads.emplace_back(work);
+  work();
+  for (std::thread& thread : threads) thread.join();
+  if (failed) std::rethrow_exception(failed);
+  all.p95_y_m = pooled[0].quantile_m(0.95);
+  all.p95_z_m = pooled[1].quantile_m(0.95);
+  summarise(all);
+  return all;
 }
 
-double RunResult::rms_m() const { return std::sqrt(squares_m2[0] + squares_m2[1]); }
-
-Plane ControllerResult::rms_m() const {
-  Plane mean{};
-  for (const RunResult& run : runs) {
-    for (std::size_t i = 0; i < 2; ++i) mean[i] += run.squares_m2[i] / static_cast<double>(runs.size());
-  }
-  return {std::sqrt(mean[0]), std::sqrt(mean[1])};
-}
-
-Plane ControllerResult::largest_m() const {
-  Plane largest{};
-  for (const RunResult& run : runs) {
-    for (std::size_t i = 0; i < 2; ++i) largest[i] = std::max(largest[i], run.largest_m[i]);
-  }
-  return largest;
-}
-
-int ControllerResult::contacts_of_all() const {
-  int sum = 0;
-  for (const RunResult& run : runs) sum += run.contacts;
-  return sum;
-}
-
-std::optional<ContactEvent> ControllerResult::first_contact() const {
-  std::optional<ContactEvent> first;
-  for (const RunResult& run : runs) {
-    if (run.first_contact && (!first || run.first_contact->time_s < first->time_s)) first = run.first_contact;
-  }
-  return first;
-}
-
-double ControllerResult::estimator_rms_m() const {
-  double mean = 0;
-  for (const RunResult& run : runs) mean += run.estimator_squares_m2[0] + run.estimator_squares_m2[1];
-  return std::sqrt(mean / static_cast<double>(runs.size()));
-}
-
-double ControllerResult::mean_of(double RunResult::*value) const {
-  double sum = 0;
-  for (const RunResult& run : runs) sum += run.*value;
-  return sum / static_cast<double>(runs.size());
-}
-
-int ControllerResult::lost_runs() const {
-  int lost = 0;
-  for (const RunResult& run : runs) lost += run.lost ? 1 : 0;
-  return lost;
-}
-
-std::pair<double, double> ControllerResult::rms_with_interval_m() const {
-  const auto n = static_cast<double>(runs.size());
-  double mean = 0, square = 0;
-  for (const RunResult& run : runs) mean += run.rms_m() / n;
-  for (const RunResult& run : runs) square += std::pow(run.rms_m() - mean, 2);
-  if (runs.size() < 2) return {mean, 0};
-  return {mean, student_t_975(static_cast<int>(n) - 1) * std::sqrt(square / (n - 1) / n)};
-}
-
-double student_t_975(int degrees) {
-  constexpr std::array<double, 10> kTable = {12.706, 4.303, 3.182, 2.776, 2.571,
-                                             2.447,  2.365, 2.306, 2.262, 2.228};
-  if (degrees < 1) return 0;
-  if (degrees <= 10) return kTable[static_cast<std::size_t>(degrees - 1)];
-  // Cornish-Fisher (Abramowitz and Stegun 26.7.5), within 0.001 from 11 degrees on.
-  const double z = 1.959964, n = degrees, z3 = z * z * z, z5 = z3 * z * z;
-  return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n);
+FlightLog fly_logged(const FlightTask& task, std::string_view controller, const GainTable& gains, int run,
+                     FlightScore* score) {
+  const DisturbanceField map = field_of(task);
+  FlightLog log;
+  const FlightScore result = Worker(task, &map, controller, gains).run(run, &log);
+  if (score != nullptr) *score = result;
+  return log;
 }
 
 }  // namespace tunnelrig

@@ -5,91 +5,66 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <vector>
 
 #include <Eigen/Eigenvalues>
 
 namespace tunnelrig {
-namespace {
 
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
+SearchResult minimise(const std::function<double(const Eigen::VectorXd&)>& cost, const Eigen::VectorXd& start, double spread,
+                      int budget, std::uint64_t seed) {
+  const Eigen::Index n = start.size();
+  const auto dim = static_cast<double>(n);
+  const int population = 4 + static_cast<int>(3 * std::log(dim)), parents = population / 2;
+  Eigen::VectorXd weight(parents);
+  for (int i = 0; i < parents; ++i) weight[i] = std::log(0.5 * (population + 1)) - std::log(i + 1.0);
+  weight /= weight.sum();
+  const double mu = 1 / weight.squaredNorm();
+  const double c_sigma = (mu + 2) / (dim + mu + 5), c_path = (4 + mu / dim) / (dim + 4 + 2 * mu / dim);
+  const double damping = 1 + 2 * std::max(0.0, std::sqrt((mu - 1) / (dim + 1)) - 1) + c_sigma;
+  const double c_one = 2 / ((dim + 1.3) * (dim + 1.3) + mu);
+  const double c_mu = std::min(1 - c_one, 2 * (mu - 2 + 1 / mu) / ((dim + 2) * (dim + 2) + mu));
+  const double expected = std::sqrt(dim) * (1 - 1 / (4 * dim) + 1 / (21 * dim * dim));
 
-/// The constants of the tutorial's table 1 without its negative weights.
-struct Constants {
-  int population, parents;
-  VectorXd weights;
-  double mu, c_sigma, d_sigma, c_c, c_1, c_mu, chi;
-
-  explicit Constants(double n) {
-    population = 4 + static_cast<int>(3 * std::log(n));
-    parents = population / 2;
-    weights.resize(parents);
-    for (int i = 0; i < parents; ++i) weights[i] = std::log((population + 1) / 2.0) - std::log(i + 1.0);
-    weights /= weights.sum();
-    mu = 1 / weights.squaredNorm();
-    c_sigma = (mu + 2) / (n + mu + 5);
-    d_sigma = 1 + 2 * std::max(0.0, std::sqrt((mu - 1) / (n + 1)) - 1) + c_sigma;
-    c_c = (4 + mu / n) / (n + 4 + 2 * mu / n);
-    c_1 = 2 / ((n + 1.3) * (n + 1.3) + mu);
-    c_mu = std::min(1 - c_1, 2 * (mu - 2 + 1 / mu) / ((n + 2) * (n + 2) + mu));
-    chi = std::sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n));
-  }
-};
-
-}  // namespace
-
-CmaResult minimise(const std::function<double(const std::vector<double>&)>& cost, const std::vector<double>& start,
-                   const std::vector<double>& low, const std::vector<double>& high, const CmaSettings& settings) {
-  const auto n = static_cast<Eigen::Index>(start.size());
-  const Constants k(static_cast<double>(n));
-  Random random(settings.seed);
-  VectorXd mean = Eigen::Map<const VectorXd>(start.data(), n);
-  MatrixXd covariance = MatrixXd::Identity(n, n);
-  VectorXd path_sigma = VectorXd::Zero(n), path_c = VectorXd::Zero(n);
-  double sigma = settings.step;
-  CmaResult result{start, cost(start), 0, 1};
-  result.cost_at_start = result.cost;
-  for (int generation = 1; result.evaluations + k.population <= settings.evaluations; ++generation) {
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance);
-    const VectorXd scale = eigen.eigenvalues().cwiseMax(1e-20).cwiseSqrt();
-    const MatrixXd& axes = eigen.eigenvectors();
-    std::vector<VectorXd> steps;
-    std::vector<double> costs;
-    for (int i = 0; i < k.population; ++i) {
-      VectorXd z(n);
-      for (double& value : z) value = random.normal();
-      std::vector<double> x(start.size());
-      VectorXd moved = mean + sigma * (axes * scale.cwiseProduct(z));
-      for (std::size_t j = 0; j < x.size(); ++j) {
-        x[j] = std::clamp(moved[static_cast<Eigen::Index>(j)], low[j], high[j]);
-        moved[static_cast<Eigen::Index>(j)] = x[j];
-      }
-      steps.emplace_back((moved - mean) / sigma);
-      costs.push_back(cost(x));
-      ++result.evaluations;
-      if (costs.back() < result.cost) {
-        result.cost = costs.back();
-        result.best = x;
-      }
+  Random random(seed);
+  Eigen::VectorXd mean = start, path = Eigen::VectorXd::Zero(n), path_sigma = path;
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(n, n);
+  double sigma = spread;
+  SearchResult result{start, cost(start), 1};
+  while (result.evaluations < budget) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
+    const Eigen::VectorXd scale = eigen.eigenvalues().cwiseMax(1e-12).cwiseSqrt();
+    std::vector<Eigen::VectorXd> step;
+    std::vector<double> value;
+    for (int k = 0; k < population && result.evaluations < budget; ++k, ++result.evaluations) {
+      Eigen::VectorXd z(n);
+      for (Eigen::Index i = 0; i < n; ++i) z[i] = random.normal();
+      step.emplace_back(eigen.eigenvectors() * scale.cwiseProduct(z));
+      const Eigen::VectorXd wanted = mean + sigma * step.back(), inside = wanted.cwiseMax(0).cwiseMin(1);
+      const double inside_cost = cost(inside);
+      if (inside_cost < result.cost) result.best = inside, result.cost = inside_cost;
+      value.push_back(inside_cost * (1 + 10 * (wanted - inside).squaredNorm()));
     }
-    std::vector<std::size_t> order(costs.size());
-    std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return costs[a] < costs[b]; });
-    VectorXd step = VectorXd::Zero(n);
-    MatrixXd rank_mu = MatrixXd::Zero(n, n);
-    for (int i = 0; i < k.parents; ++i) {
-      const VectorXd& y = steps[order[static_cast<std::size_t>(i)]];
-      step += k.weights[i] * y;
-      rank_mu += k.weights[i] * y * y.transpose();
+    if (static_cast<int>(step.size()) < population) break;
+    std::vector<std::size_t> order(step.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return value[a] < value[b]; });
+
+    Eigen::VectorXd move = Eigen::VectorXd::Zero(n);
+    Eigen::MatrixXd rank_mu = Eigen::MatrixXd::Zero(n, n);
+    for (int i = 0; i < parents; ++i) {
+      const Eigen::VectorXd& y = step[order[static_cast<std::size_t>(i)]];
+      move += weight[i] * y;
+      rank_mu += weight[i] * y * y.transpose();
     }
-    mean += sigma * step;
-    const VectorXd whitened = axes * (axes.transpose() * step).cwiseQuotient(scale);
-    path_sigma = (1 - k.c_sigma) * path_sigma + std::sqrt(k.c_sigma * (2 - k.c_sigma) * k.mu) * whitened;
-    const double expected = std::sqrt(1 - std::pow(1 - k.c_sigma, 2 * generation)) * k.chi;
-    const bool holds = path_sigma.norm() < (1.4 + 2 / (static_cast<double>(n) + 1)) * expected;
-    path_c = (1 - k.c_c) * path_c + (holds ? std::sqrt(k.c_c * (2 - k.c_c) * k.mu) : 0) * step;
-    covariance = (1 - k.c_1 - k.c_mu) * covariance + k.c_1 * path_c * path_c.transpose() + k.c_mu * rank_mu;
-    sigma *= std::exp(k.c_sigma / k.d_sigma * (path_sigma.norm() / k.chi - 1));
+    mean = (mean + sigma * move).cwiseMax(0).cwiseMin(1);
+    const Eigen::VectorXd whitened =
+        eigen.eigenvectors() * (eigen.eigenvectors().transpose() * move).cwiseQuotient(scale);
+    path_sigma = (1 - c_sigma) * path_sigma + std::sqrt(c_sigma * (2 - c_sigma) * mu) * whitened;
+    path = (1 - c_path) * path + std::sqrt(c_path * (2 - c_path) * mu) * move;
+    covariance = (1 - c_one - c_mu) * covariance + c_one * path * path.transpose() + c_mu * rank_mu;
+    sigma *= std::exp(c_sigma / damping * (path_sigma.norm() / expected - 1));
+    sigma = std::min(sigma, 0.5);
   }
   return result;
 }
