@@ -52,14 +52,13 @@ PlanarReference Segment::at(double t) const {
     }
     case Kind::kCircle:
     case Kind::kFigure: {
-      for (std::size_t i = 0; i < 2; ++i) {
-        const double w = rate_rad_s[i], a = amplitude_m[i];
-        const double s = std::sin(w * t), c = std::cos(w * t);
-        r.position_m[i] = centre_m[i] + a * (i == 0 ? s : c);
-        r.velocity_m_s[i] = a * w * (i == 0 ? c : -s);
-        r.acceleration_m_s2[i] = -a * w * w * (i == 0 ? s : c);
-        r.jerk_m_s3[i] = -a * w * w * w * (i == 0 ? c : -s);
-      }
+      const double wy = rate_rad_s[0], wz = rate_rad_s[1], ay = amplitude_m[0], az = amplitude_m[1];
+      const double sy = std::sin(wy * t), cy = std::cos(wy * t);
+      const double sz = wz == wy ? sy : std::sin(wz * t), cz = wz == wy ? cy : std::cos(wz * t);
+      r.position_m = {centre_m[0] + ay * sy, centre_m[1] + az * cz};
+      r.velocity_m_s = {ay * wy * cy, -az * wz * sz};
+      r.acceleration_m_s2 = {-ay * wy * wy * sy, -az * wz * wz * cz};
+      r.jerk_m_s3 = {-ay * wy * wy * wy * cy, az * wz * wz * wz * sz};
       break;
     }
   }

@@ -66,6 +66,13 @@ class InertialUnit {
     acceleration_m_s2_ = {force[0] - e * force[1], force[1] + e * force[0] - kGravity_m_s2};
   }
 
+  /// sin φ and cos φ cos θ of the estimated attitude; the heading is near 0 (3.5).
+  void tilt(const RigidState& state, ControlInput& in) const {
+    const std::array<double, 3> up = thrust_axis(state.attitude);
+    in.sin_roll = -up[1] + sensors_.roll_error_rad * up[2];
+    in.cos_tilt = up[2] + sensors_.roll_error_rad * up[1];
+  }
+
   const AttitudeSense& attitude() const { return attitude_; }
   const Plane& acceleration_m_s2() const { return acceleration_m_s2_; }
 
@@ -105,9 +112,7 @@ FlightScore fly(const FlightSetup& setup, Estimator& estimator, AnyController& c
                     .position_m = estimate.position_m,
                     .velocity_m_s = estimate.velocity_m_s,
                     .acceleration_m_s2 = inertial.acceleration_m_s2()};
-    const EulerAngles& angles = inertial.attitude().angles;
-    in.sin_roll = std::sin(angles.roll_rad);
-    in.cos_tilt = std::cos(angles.roll_rad) * std::cos(angles.pitch_rad);
+    inertial.tilt(state, in);
     const ControlOutput out = controller.step(in);
     const PerRotor thrust_N =
         attitude.step({out.roll_rad, pilot_pitch(setup.pilot, state), out.thrust_m_s2, out.roll_moment_N_m},

@@ -6,58 +6,35 @@
 namespace tunnelrig {
 namespace {
 
-/// The state's thirteen numbers in its own order, so that the sums of the method are plain loops.
-constexpr std::size_t kNumbers = 13;
-using Vector = std::array<double, kNumbers>;
+/// What the derivatives depend on, as plain numbers that stay in registers: the position is not among them.
+struct Motion {
+  double vx, vy, vz, qw, qx, qy, qz, wx, wy, wz;
 
-Vector pack(const RigidState& s) {
-  Vector v{};
-  std::copy(s.position_m.begin(), s.position_m.end(), v.begin());
-  std::copy(s.velocity_m_s.begin(), s.velocity_m_s.end(), v.begin() + 3);
-  std::copy(s.attitude.begin(), s.attitude.end(), v.begin() + 6);
-  std::copy(s.rate_rad_s.begin(), s.rate_rad_s.end(), v.begin() + 10);
-  return v;
-}
+  Motion plus(const Motion& d, double step) const {
+    return {vx + step * d.vx, vy + step * d.vy, vz + step * d.vz, qw + step * d.qw, qx + step * d.qx,
+            qy + step * d.qy, qz + step * d.qz, wx + step * d.wx, wy + step * d.wy, wz + step * d.wz};
+  }
+};
 
-RigidState unpack(const Vector& v) {
-  RigidState s;
-  std::copy_n(v.begin(), 3, s.position_m.begin());
-  std::copy_n(v.begin() + 3, 3, s.velocity_m_s.begin());
-  std::copy_n(v.begin() + 6, 4, s.attitude.begin());
-  std::copy_n(v.begin() + 10, 3, s.rate_rad_s.begin());
-  return s;
-}
-
-inline void derive(const Vector& s, const BodyConstants& b, const RotorLoads& loads, double wind_m_s,
-                   Vector& d) {
-  const double vx = s[3] - wind_m_s, vy = s[4], vz = s[5];
-  const double qw = s[6], qx = s[7], qy = s[8], qz = s[9];
-  const double wx = s[10], wy = s[11], wz = s[12];
-  const double ax = 2 * (qx * qz + qw * qy), ay = 2 * (qy * qz - qw * qx), az = 1 - 2 * (qx * qx + qy * qy);
-  const double across = b.drag_across + b.drag_quadratic * std::sqrt(vx * vx + vy * vy + vz * vz);
-  const double axial = loads.thrust_N - (b.drag_along - b.drag_across) * (vx * ax + vy * ay + vz * az);
-  d[0] = s[3];
-  d[1] = s[4];
-  d[2] = s[5];
-  d[3] = (axial * ax - across * vx) * b.per_mass;  // (3.2)
-  d[4] = (axial * ay - across * vy) * b.per_mass;
-  d[5] = (axial * az - across * vz) * b.per_mass - b.gravity_m_s2;
-  d[6] = -0.5 * (qx * wx + qy * wy + qz * wz);
-  d[7] = 0.5 * (qw * wx + qy * wz - qz * wy);
-  d[8] = 0.5 * (qw * wy + qz * wx - qx * wz);
-  d[9] = 0.5 * (qw * wz + qx * wy - qy * wx);
-  d[10] = (loads.moment_N_m[0] - b.rate_damping[0] * wx + (b.inertia[1] - b.inertia[2]) * wy * wz) *
-          b.per_inertia[0];
-  d[11] = (loads.moment_N_m[1] - b.rate_damping[1] * wy + (b.inertia[2] - b.inertia[0]) * wz * wx) *
-          b.per_inertia[1];
-  d[12] = (loads.moment_N_m[2] - b.rate_damping[2] * wz + (b.inertia[0] - b.inertia[1]) * wx * wy) *
-          b.per_inertia[2];
-}
-
-inline Vector along(const Vector& s, const Vector& d, double step) {
-  Vector r;
-  for (std::size_t i = 0; i < kNumbers; ++i) r[i] = s[i] + step * d[i];
-  return r;
+/// `across` is the drag over the velocity across the rotor axes.
+inline Motion derivative(const Motion& s, const BodyConstants& b, const RotorLoads& loads, double wind_m_s,
+                         double across) {
+  const double vx = s.vx - wind_m_s;
+  const double ax = 2 * (s.qx * s.qz + s.qw * s.qy), ay = 2 * (s.qy * s.qz - s.qw * s.qx);
+  const double az = 1 - 2 * (s.qx * s.qx + s.qy * s.qy);
+  const double axial = loads.thrust_N - (b.drag_along - b.drag_across) * (vx * ax + s.vy * ay + s.vz * az);
+  const auto& [ix, iy, iz] = b.inertia;
+  return {
+      (axial * ax - across * vx) * b.per_mass,  // (3.2)
+      (axial * ay - across * s.vy) * b.per_mass,
+      (axial * az - across * s.vz) * b.per_mass - b.gravity_m_s2,
+      -0.5 * (s.qx * s.wx + s.qy * s.wy + s.qz * s.wz),
+      0.5 * (s.qw * s.wx + s.qy * s.wz - s.qz * s.wy),
+      0.5 * (s.qw * s.wy + s.qz * s.wx - s.qx * s.wz),
+      0.5 * (s.qw * s.wz + s.qx * s.wy - s.qy * s.wx),
+      (loads.moment_N_m[0] - b.rate_damping[0] * s.wx + (iy - iz) * s.wy * s.wz) * b.per_inertia[0],  // (3.3)
+      (loads.moment_N_m[1] - b.rate_damping[1] * s.wy + (iz - ix) * s.wz * s.wx) * b.per_inertia[1],
+      (loads.moment_N_m[2] - b.rate_damping[2] * s.wz + (ix - iy) * s.wx * s.wy) * b.per_inertia[2]};
 }
 
 }  // namespace
@@ -74,19 +51,36 @@ BodyConstants::BodyConstants(const Airframe& frame)
 
 void rk4_step(RigidState& state, const BodyConstants& body, const StepLoads& loads, double wind_m_s,
               double step_s) {
-  const Vector s = pack(state);
-  Vector k1, k2, k3, k4, end;
-  derive(s, body, loads[0], wind_m_s, k1);
-  derive(along(s, k1, 0.5 * step_s), body, loads[1], wind_m_s, k2);
-  derive(along(s, k2, 0.5 * step_s), body, loads[1], wind_m_s, k3);
-  derive(along(s, k3, step_s), body, loads[2], wind_m_s, k4);
+  auto& [px, py, pz] = state.position_m;
+  auto& [vx, vy, vz] = state.velocity_m_s;
+  auto& [qw, qx, qy, qz] = state.attitude;
+  auto& [wx, wy, wz] = state.rate_rad_s;
+  const Motion s = {vx, vy, vz, qw, qx, qy, qz, wx, wy, wz};
+  const double air_x = vx - wind_m_s;
+  const double across = body.drag_across + body.drag_quadratic * std::sqrt(air_x * air_x + vy * vy + vz * vz);
+  const Motion k1 = derivative(s, body, loads[0], wind_m_s, across);
+  const Motion k2 = derivative(s.plus(k1, 0.5 * step_s), body, loads[1], wind_m_s, across);
+  const Motion k3 = derivative(s.plus(k2, 0.5 * step_s), body, loads[1], wind_m_s, across);
+  const Motion k4 = derivative(s.plus(k3, step_s), body, loads[2], wind_m_s, across);
+  // The method's sums for the position, whose derivatives are the stages' velocities.
+  const double third = step_s * step_s / 6;
+  px += step_s * vx + third * (k1.vx + k2.vx + k3.vx);
+  py += step_s * vy + third * (k1.vy + k2.vy + k3.vy);
+  pz += step_s * vz + third * (k1.vz + k2.vz + k3.vz);
   const double sixth = step_s / 6;
-  for (std::size_t i = 0; i < kNumbers; ++i) end[i] = s[i] + sixth * (k1[i] + 2 * (k2[i] + k3[i]) + k4[i]);
+  const Motion end = s.plus(k1, sixth).plus(k2, 2 * sixth).plus(k3, 2 * sixth).plus(k4, sixth);
+  vx = end.vx;
+  vy = end.vy;
+  vz = end.vz;
+  wx = end.wx;
+  wy = end.wy;
+  wz = end.wz;
   // One Newton step of 1/|q|: the method leaves |q| within 1e-12 of 1.
-  const double correction =
-      1.5 - 0.5 * (end[6] * end[6] + end[7] * end[7] + end[8] * end[8] + end[9] * end[9]);
-  for (std::size_t i = 6; i < 10; ++i) end[i] *= correction;
-  state = unpack(end);
+  const double norm = 1.5 - 0.5 * (end.qw * end.qw + end.qx * end.qx + end.qy * end.qy + end.qz * end.qz);
+  qw = norm * end.qw;
+  qx = norm * end.qx;
+  qy = norm * end.qy;
+  qz = norm * end.qz;
 }
 
 EulerAngles euler_angles(const std::array<double, 4>& q) {

@@ -34,7 +34,8 @@ struct BodyConstants {
   double gravity_m_s2 = kGravity_m_s2;
 };
 
-/// One step of the classical Runge-Kutta method; `wind_m_s` moves along x and is held over the step.
+/// One step of the classical Runge-Kutta method. `wind_m_s` moves along x; it and the size of the airspeed in
+/// the quadratic drag are held over the step.
 void rk4_step(RigidState& state, const BodyConstants& body, const StepLoads& loads, double wind_m_s,
               double step_s);
 
