@@ -1,4 +1,5 @@
-// The estimator in the loop: simulated LIDAR → scan matcher → Kalman filter, with the sweep's duration and the matcher's latency.
+// The estimator in the loop: simulated LIDAR → scan matcher → Kalman filter, with the sweep's duration and
+// the matcher's latency.
 #pragma once
 
 #include "flight/lidar/simulated_lidar.h"
@@ -14,9 +15,12 @@ namespace tunnelrig {
 
 struct LocalisationSettings {
   LidarSettings lidar;
-  int cycles_per_scan = 10;    // 40 Hz
-  int cycles_of_latency = 4;   // from the sweep's end to the correction: transfer and matching, 10 ms; assumed
-  KinematicModel model;
+  int cycles_per_scan = 10;   // 40 Hz
+  int cycles_of_latency = 4;  // from the sweep's end to the correction: transfer and matching, 10 ms; assumed
+  AugmentedModel model;       // what the walls do would otherwise look like motion to it
+  double skew_share =
+      0.5;  // of a sweep's roll times half the height, as a match's further standard deviation
+  double roll_sigma_rad = 0.0035;  // of the attitude estimate's constant error, which no scan shows
   GateSettings gate;
 };
 
@@ -46,12 +50,14 @@ class Localisation {
 
   double floor_m_;
   LocalisationSettings settings_;
+  Eigen::Vector2d middle_m_{0, 0};  // of the section's bounding box
   const CrossSection* section_;
   ScanMatcher matcher_;
   std::optional<SimulatedLidar> lidar_;
-  std::optional<KalmanFilter> filter_;
+  std::optional<AugmentedFilter> filter_;
   Scan scan_;
   Attitude scan_attitude_;
+  double skew_m_ = 0;
   std::array<Moment, kRemembered> moments_;
   long cycle_ = 0;
   bool waiting_ = false;
