@@ -24,7 +24,7 @@ struct Tuned {
   double cost_m = 0, start_cost_m = 0;  // root of the mean of squares
 };
 
-/// √(mean over hover and training in the 1.5 m tunnel of rms² + (effort)² + contacts²), LIDAR and matcher in the loop.
+/// √(mean over hover and training in the 1.5 m tunnel of rms² + (effort)² + contacts²), position given.
 double tuning_cost_m(std::string_view controller, const GainTable& gains, const DisturbanceMap& map,
                      const TuningSettings& settings);
 
