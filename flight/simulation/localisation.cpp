@@ -33,7 +33,8 @@ void Localisation::prepare(std::uint64_t seed, std::uint64_t stream) {
 
 void Localisation::start(const RigidState& truth) {
   if (!lidar_) prepare(0, 0);
-  filter_.emplace(Eigen::Vector2d(truth.position_m[1], truth.position_m[2] + floor_m_), settings_.model, settings_.gate);
+  filter_.emplace(Eigen::Vector2d(truth.position_m[1], truth.position_m[2] + floor_m_), settings_.model,
+                  settings_.gate);
   cycle_ = nees_count_ = 0;
   matches_ = rejected_ = 0;
   nees_sum_ = 0;
@@ -59,7 +60,9 @@ PlanarEstimate Localisation::step(const EstimatorInput& in) {
 
 void Localisation::take_scan() {
   const auto cycles = static_cast<long>(std::lround(settings_.lidar.sweep_s / kControlStep_s));
-  const auto at = [&](long cycle) -> const Moment& { return moments_[static_cast<std::size_t>(cycle) % kRemembered]; };
+  const auto at = [&](long cycle) -> const Moment& {
+    return moments_[static_cast<std::size_t>(cycle) % kRemembered];
+  };
   scan_ = lidar_->sweep(at(cycle_ - cycles).pose, at(cycle_).pose);
   // Motion within the sweep is small and nearly uniform: the scan counts as taken in its middle.
   const Attitude &from = at(cycle_ - cycles).measured, &to = at(cycle_).measured;
@@ -75,7 +78,12 @@ void Localisation::correct() {
   bool used = match.accepted;
   if (used) {
     const double age_s = settings_.cycles_of_latency * kControlStep_s + 0.5 * settings_.lidar.sweep_s;
-    used = filter_->correct(match.position_m, match.covariance_m2, age_s).accepted;
+    constexpr double kBlindSpot_m2 = 0.1;  // what it leaves of the effect in the centre
+    const double turned = settings_.attitude_sigma_rad * settings_.attitude_sigma_rad *
+                          (match.position_m.squaredNorm() + kBlindSpot_m2);
+    used =
+        filter_->correct(match.position_m, match.covariance_m2 + turned * Eigen::Matrix2d::Identity(), age_s)
+            .accepted;
   }
   if (!used) ++rejected_;
 }

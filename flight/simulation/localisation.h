@@ -1,4 +1,5 @@
-// The estimator in the loop: simulated LIDAR → scan matcher → Kalman filter, with the sweep's duration and the matcher's latency.
+// The estimator in the loop: simulated LIDAR → scan matcher → Kalman filter, with the sweep's duration and
+// the matcher's latency.
 #pragma once
 
 #include "flight/lidar/simulated_lidar.h"
@@ -14,10 +15,14 @@ namespace tunnelrig {
 
 struct LocalisationSettings {
   LidarSettings lidar;
-  int cycles_per_scan = 10;    // 40 Hz
-  int cycles_of_latency = 4;   // from the sweep's end to the correction: transfer and matching, 10 ms; assumed
-  KinematicModel model;
+  int cycles_per_scan = 10;   // 40 Hz
+  int cycles_of_latency = 4;  // from the sweep's end to the correction: transfer and matching, 10 ms; assumed
+  /// Not the accelerometer's noise alone: the attitude's error leaves an acceleration of g times it, which
+  /// the filter must be allowed to correct.
+  KinematicModel model = {.acceleration_variance_m2_s4 = 0.45};
   GateSettings gate;
+  double attitude_sigma_rad =
+      0.0035;  // turns the scan, which moves the match by it times the distance from the centre
 };
 
 /// Positions in the flight frame (z above the floor). `space` must outlive it.
