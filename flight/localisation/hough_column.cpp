@@ -97,12 +97,16 @@ HoughPeak HoughColumn::interpolated(std::size_t at) const {
   return {first_shift_m_ + cell_m_ * (static_cast<double>(at) + fraction), score_[at]};
 }
 
+float HoughColumn::height(const BeamKernels& kernels, double from_m, double to_m) const {
+  if (!(from_m <= to_m)) return 0;
+  const std::size_t first = cell_of(from_m);
+  return kernels.maximum(score_.data() + first, cell_of(to_m) + 1 - first);
+}
+
 HoughPeak HoughColumn::highest(const BeamKernels& kernels, double from_m, double to_m) const {
   if (!(from_m <= to_m)) return {};
-  const std::size_t first = cell_of(from_m);
-  const std::size_t size = cell_of(to_m) + 1 - first;
-  const float most = kernels.maximum(score_.data() + first, size);
-  const auto at = std::find(score_.begin() + static_cast<std::ptrdiff_t>(first), score_.end() - 1, most);
+  const auto from = score_.begin() + static_cast<std::ptrdiff_t>(cell_of(from_m));
+  const auto at = std::find(from, score_.end() - 1, height(kernels, from_m, to_m));
   return interpolated(static_cast<std::size_t>(at - score_.begin()));
 }
 

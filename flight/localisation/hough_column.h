@@ -27,6 +27,7 @@ class HoughColumn {
   /// Fills the scores for a scan whose beams have been projected.
   void correlate(const BeamKernels& kernels, const Beams& beams);
 
+  float height(const BeamKernels& kernels, double from_m, double to_m) const;  // the highest score
   HoughPeak highest(const BeamKernels& kernels, double from_m, double to_m) const;
 
   /// The highest scores between two shifts, at least `apart_m` from each other, best first, at most `most`.

@@ -37,9 +37,8 @@ Found first_of(const std::vector<Start>& grid) {
 /// How high the best peak outside of `best ± apart` is.
 float rival(const HoughColumn& column, const BeamKernels& kernels, double from_m, double to_m,
             double best_m) {
-  const HoughPeak below = column.highest(kernels, from_m, best_m - kApart_m);
-  const HoughPeak above = column.highest(kernels, best_m + kApart_m, to_m);
-  return std::max(below.score, above.score);
+  return std::max(column.height(kernels, from_m, best_m - kApart_m),
+                  column.height(kernels, best_m + kApart_m, to_m));
 }
 
 }  // namespace
