@@ -113,6 +113,7 @@ struct Body {
     Floats normal[unknowns * (unknowns + 1) / 2][kParts] = {};
     Floats gradient[unknowns][kParts] = {};
     Floats square[kParts] = {};
+    Floats absolute[kParts] = {};
     Floats inliers[kParts] = {};
     Floats beyond[kParts] = {};
     Floats expected[kParts] = {};
@@ -145,12 +146,14 @@ struct Body {
       if constexpr (unknowns >= 4)
         j[3] = scale * should * wall_y * *reinterpret_cast<const Floats*>(beams.along_y + i);
       square[part] += e * e;
+      absolute[part] += e < zero ? -e : e;
       for (int a = 0, k = 0; a < unknowns; ++a) {
         gradient[a][part] += j[a] * e;
         for (int b = 0; b <= a; ++b, ++k) normal[k][part] += j[a] * j[b];
       }
     }
     sums.square = total(square);
+    sums.absolute = total(absolute);
     sums.inliers = total(inliers);
     sums.beyond = total(beyond);
     sums.expected = total(expected);

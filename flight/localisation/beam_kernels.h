@@ -55,6 +55,7 @@ struct FitSums {
   float normal[4][4] = {};  // JᵀJ, lower triangle
   float gradient[4] = {};   // Jᵀe
   float square = 0;         // eᵀe
+  float absolute = 0;       // Σ|e|
   float inliers = 0;        // beams within the gate
   float beyond = 0;         // beams that see through the expected wall
   float expected = 0;       // beams with a return and a wall to meet
