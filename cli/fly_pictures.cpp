@@ -61,7 +61,7 @@ std::string path_plot(const FlownScenario& flown, const FlightTask& task, std::s
 
 std::string error_plot(const FlownScenario& flown, std::size_t shown, const char* axis, int column) {
   std::string text = fmt::format(
-      "set size noratio\nset autoscale\nset offsets 0, 0, graph 0.05, graph 0.05\nset key outside right top\n"
+      "set size noratio\nset autoscale xfix\nset offsets 0, 0, graph 0.05, graph 0.05\nset key outside right top\n"
       "set xlabel 'time [s]'\nset ylabel 'error in {} (reference − position) [mm]'\nplot 0 lc rgb '#999999' notitle",
       axis);
   for (std::size_t i = 0; i < shown; ++i)

@@ -36,7 +36,12 @@ AnyController::Variant AnyController::make(std::string_view name, const Controll
   const double full = context.full_thrust_m_s2;
   if (name == "ibs") return Ibs(IbsForm::kPrinted, {});
   if (name == "ibs-lyapunov") return Ibs(IbsForm::kLyapunov, {});
-  if (name == "ibs-map" || name == "ibs-map-off") return IbsMap({}, context);
+  if (name == "ibs-map") return IbsMap({}, context);
+  if (name == "ibs-map-off") {
+    ControllerContext without = context;
+    without.map = nullptr;
+    return IbsMap({}, without);
+  }
   if (name == "ibs-do") return IbsObserver({});
   if (name == "indi") return Indi({});
   if (name == "pid" || name == "pid-stock") return PidCascade({}, {}, full, false);
@@ -77,7 +82,8 @@ GainTable parse_gains(std::string_view text, const std::string& file) {
     if (name == "format") continue;
     const toml::table* table = node.as_table();
     if (table == nullptr) throw InputError::at(file, line_of(node), "{} is no table; write [{}]", name, name);
-    const auto kind = std::find_if(kKinds.begin(), kKinds.end(), [&](const auto& k) { return k.name == name; });
+    const auto kind =
+        std::find_if(kKinds.begin(), kKinds.end(), [&](const auto& k) { return k.name == name; });
     if (kind != kKinds.end() && !kind->tuned)
       throw InputError::at(file, line_of(node), "{} has no gains of its own: {}", name, kind->description);
     AnyController controller = [&] {
@@ -89,8 +95,8 @@ GainTable parse_gains(std::string_view text, const std::string& file) {
     }();
     const auto known = controller.gain_list();
     for (const auto& [gain_key, value_node] : *table) {
-      const auto gain =
-          std::find_if(known.begin(), known.end(), [&](const NamedGain& g) { return g.name == gain_key.str(); });
+      const auto gain = std::find_if(known.begin(), known.end(),
+                                     [&](const NamedGain& g) { return g.name == gain_key.str(); });
       if (gain == known.end())
         throw InputError::at(file, line_of(value_node), "{} has no gain {}", name, gain_key.str());
       const auto value = value_node.value<double>();

@@ -16,7 +16,6 @@ struct ControllerContext {
       kRotors * Airframe{}.largest_thrust_N / Airframe{}.mass_kg;  // u₁ at full throttle
   const DisturbanceField* map = nullptr;                           // the measured one; not owned
   SectionScale scale;
-  double map_share = 1;  // how much of the map is fed forward; 0 compares the same controller without it
 };
 
 class IbsMap {
@@ -31,9 +30,9 @@ class IbsMap {
     const double y_m = in.position_m[0] + ahead_s_ * in.velocity_m_s[0];
     const double z_m = in.position_m[1] + ahead_s_ * in.velocity_m_s[1];
     const Disturbance d = context_.map->at(context_.scale.y_norm(y_m), context_.scale.z_norm(z_m));
-    out.thrust_m_s2 /= 1 + context_.map_share * d.thrust_change;
-    out.roll_moment_N_m = -context_.map_share * d.uneven * (1 + d.thrust_change) * context_.rotor_offset_m *
-                          context_.mass_kg * out.thrust_m_s2;
+    out.thrust_m_s2 /= 1 + d.thrust_change;
+    out.roll_moment_N_m =
+        -d.uneven * (1 + d.thrust_change) * context_.rotor_offset_m * context_.mass_kg * out.thrust_m_s2;
     return out;
   }
 

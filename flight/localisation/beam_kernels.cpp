@@ -10,12 +10,42 @@ namespace {
 // Forced into the functions below, which are compiled for one instruction set each.
 #define TUNNELRIG_BODY [[gnu::always_inline]] static inline
 
-using Floats = float __attribute__((vector_size(64), may_alias));
-using Ints = std::int32_t __attribute__((vector_size(64), may_alias));
+// What a processor holds in one register. Sums are kept eight side by side whatever the width.
+struct Four {
+  static constexpr std::size_t kWidth = 4;
+  using Floats = float __attribute__((vector_size(16), may_alias));
+  using Loose = float __attribute__((vector_size(16), aligned(4), may_alias));  // at any address
+  using Ints = std::int32_t __attribute__((vector_size(16), may_alias));
+};
+struct Eight {
+  static constexpr std::size_t kWidth = 8;
+  using Floats = float __attribute__((vector_size(32), may_alias));
+  using Loose = float __attribute__((vector_size(32), aligned(4), may_alias));  // at any address
+  using Ints = std::int32_t __attribute__((vector_size(32), may_alias));
+};
+
+constexpr std::size_t kSums = 8;
 
 constexpr float kFar_m = 1e7F;
 
+template <typename Register>
 struct Body {
+  using Floats = typename Register::Floats;
+  using Loose = typename Register::Loose;
+  using Ints = typename Register::Ints;
+  static constexpr std::size_t kWidth = Register::kWidth;
+  static constexpr std::size_t kParts = kSums / kWidth;
+
+  /// In an order that does not depend on the width.
+  TUNNELRIG_BODY float total(const Floats* parts) {
+    alignas(32) float value[kSums];
+    for (std::size_t part = 0; part < kParts; ++part)
+      *reinterpret_cast<Floats*>(value + part * kWidth) = parts[part];
+    for (std::size_t half = kSums / 2; half > 0; half /= 2)
+      for (std::size_t lane = 0; lane < half; ++lane) value[lane] += value[lane + half];
+    return value[0];
+  }
+
   TUNNELRIG_BODY int load(const float* range, const Beams& beams, float least, float most) {
     std::int32_t wrong = 0;
     std::int32_t returned = 0;
@@ -30,7 +60,7 @@ struct Body {
   }
 
   TUNNELRIG_BODY void project(const Beams& beams, const Projection& p) {
-    for (std::size_t i = 0; i < beams.padded; i += kLanes) {
+    for (std::size_t i = 0; i < beams.padded; i += kWidth) {
       const Floats c = *reinterpret_cast<const Floats*>(beams.cosine + i);
       const Floats s = *reinterpret_cast<const Floats*>(beams.sine + i);
       const Floats range = *reinterpret_cast<const Floats*>(beams.range + i);
@@ -57,31 +87,39 @@ struct Body {
 
   TUNNELRIG_BODY void see(const Beams& beams, std::size_t first, std::size_t last, float wall_y,
                           float wall_z) {
-    const float* along_y = beams.along_y;
-    const float* along_z = beams.along_z;
-    float* __restrict inverse = beams.inverse;
-    float* __restrict to_y = beams.wall_y;
-    float* __restrict to_z = beams.wall_z;
-    for (std::size_t i = first; i < last; ++i) {
-      const float value = wall_y * along_y[i] + wall_z * along_z[i];
-      const bool nearer = value > inverse[i];
-      inverse[i] = nearer ? value : inverse[i];
-      to_y[i] = nearer ? wall_y : to_y[i];
-      to_z[i] = nearer ? wall_z : to_z[i];
+    std::size_t i = first;
+    for (; i + kWidth <= last; i += kWidth) {
+      const Floats value = wall_y * *reinterpret_cast<const Loose*>(beams.along_y + i) +
+                           wall_z * *reinterpret_cast<const Loose*>(beams.along_z + i);
+      const Floats before = *reinterpret_cast<const Loose*>(beams.inverse + i);
+      const Ints nearer = value > before;
+      *reinterpret_cast<Loose*>(beams.inverse + i) = nearer ? value : before;
+      *reinterpret_cast<Loose*>(beams.wall_y + i) =
+          nearer ? Floats{} + wall_y : *reinterpret_cast<const Loose*>(beams.wall_y + i);
+      *reinterpret_cast<Loose*>(beams.wall_z + i) =
+          nearer ? Floats{} + wall_z : *reinterpret_cast<const Loose*>(beams.wall_z + i);
+    }
+    for (; i < last; ++i) {
+      const float value = wall_y * beams.along_y[i] + wall_z * beams.along_z[i];
+      if (value <= beams.inverse[i]) continue;
+      beams.inverse[i] = value;
+      beams.wall_y[i] = wall_y;
+      beams.wall_z[i] = wall_z;
     }
   }
 
   template <int unknowns>
   TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, FitSums& sums) {
-    Floats normal[unknowns * (unknowns + 1) / 2] = {};
-    Floats gradient[unknowns] = {};
-    Floats square = {};
-    Ints inliers = {};
-    Ints beyond = {};
-    Ints expected = {};
+    Floats normal[unknowns * (unknowns + 1) / 2][kParts] = {};
+    Floats gradient[unknowns][kParts] = {};
+    Floats square[kParts] = {};
+    Floats absolute[kParts] = {};
+    Floats inliers[kParts] = {};
+    Floats beyond[kParts] = {};
+    Floats expected[kParts] = {};
     const Floats zero = {};
     const Floats one = zero + 1.0F;
-    for (std::size_t i = 0; i < beams.padded; i += kLanes) {
+    for (std::size_t i = 0, part = 0; i < beams.padded; i += kWidth, part = (part + 1) % kParts) {
       const Floats range = *reinterpret_cast<const Floats*>(beams.range + i);
       const Floats inverse = *reinterpret_cast<const Floats*>(beams.inverse + i);
       const Floats wall_y = *reinterpret_cast<const Floats*>(beams.wall_y + i);
@@ -90,9 +128,10 @@ struct Body {
       const Floats should = one / (met ? inverse : one);
       const Floats error = range - should;
       const Ints in = met & (error < gate) & (error > -gate);
-      expected -= met;
-      inliers -= in;
-      beyond -= met & (error >= gate);
+      const Ints through = met & (error >= gate);
+      expected[part] += met ? one : zero;
+      inliers[part] += in ? one : zero;
+      beyond[part] += through ? one : zero;
       const Floats e = in ? error : zero;
       Floats j[unknowns];
       // Moving by d towards a wall shortens the range by d·wall·range.
@@ -106,21 +145,21 @@ struct Body {
       }
       if constexpr (unknowns >= 4)
         j[3] = scale * should * wall_y * *reinterpret_cast<const Floats*>(beams.along_y + i);
-      square += e * e;
+      square[part] += e * e;
+      absolute[part] += e < zero ? -e : e;
       for (int a = 0, k = 0; a < unknowns; ++a) {
-        gradient[a] += j[a] * e;
-        for (int b = 0; b <= a; ++b, ++k) normal[k] += j[a] * j[b];
+        gradient[a][part] += j[a] * e;
+        for (int b = 0; b <= a; ++b, ++k) normal[k][part] += j[a] * j[b];
       }
     }
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      sums.square += square[lane];
-      sums.inliers += static_cast<float>(inliers[lane]);
-      sums.beyond += static_cast<float>(beyond[lane]);
-      sums.expected += static_cast<float>(expected[lane]);
-      for (int a = 0, k = 0; a < unknowns; ++a) {
-        sums.gradient[a] += gradient[a][lane];
-        for (int b = 0; b <= a; ++b, ++k) sums.normal[a][b] += normal[k][lane];
-      }
+    sums.square = total(square);
+    sums.absolute = total(absolute);
+    sums.inliers = total(inliers);
+    sums.beyond = total(beyond);
+    sums.expected = total(expected);
+    for (int a = 0, k = 0; a < unknowns; ++a) {
+      sums.gradient[a] = total(gradient[a]);
+      for (int b = 0; b <= a; ++b, ++k) sums.normal[a][b] = total(normal[k]);
     }
   }
 
@@ -145,14 +184,12 @@ struct Body {
   TUNNELRIG_BODY void smooth(const float* in, const float* tap, std::size_t taps, float* __restrict out,
                              std::size_t size) {
     std::size_t i = 0;
-    for (; i + kLanes <= size; i += kLanes) {
+    for (; i + kWidth <= size; i += kWidth) {
       Floats sum = {};
       for (std::size_t j = 0; j < taps; ++j) {
-        Floats value;
-        __builtin_memcpy(&value, in + i + j, sizeof value);
-        sum += tap[j] * value;
+        sum += tap[j] * *reinterpret_cast<const Loose*>(in + i + j);
       }
-      __builtin_memcpy(out + i, &sum, sizeof sum);
+      *reinterpret_cast<Loose*>(out + i) = sum;
     }
     for (; i < size; ++i) {
       out[i] = 0;
@@ -163,56 +200,57 @@ struct Body {
   TUNNELRIG_BODY float maximum(const float* in, std::size_t size) {
     Floats most = {};
     std::size_t i = 0;
-    for (; i + kLanes <= size; i += kLanes) {
-      Floats value;
-      __builtin_memcpy(&value, in + i, sizeof value);
+    for (; i + kWidth <= size; i += kWidth) {
+      const Floats value = *reinterpret_cast<const Loose*>(in + i);
       most = value > most ? value : most;
     }
     float result = 0;
     for (; i < size; ++i) result = in[i] > result ? in[i] : result;
-    for (std::size_t lane = 0; lane < kLanes; ++lane) result = most[lane] > result ? most[lane] : result;
+    for (std::size_t lane = 0; lane < kWidth; ++lane) result = most[lane] > result ? most[lane] : result;
     return result;
   }
 };
 
 // One struct of functions per instruction set, each with the bodies compiled for it.
-#define TUNNELRIG_FORM(form, target)                                                                    \
-  struct form {                                                                                         \
-    target static int load(const float* range, const Beams& beams, float least, float most) {           \
-      return Body::load(range, beams, least, most);                                                     \
-    }                                                                                                   \
-    target static void project(const Beams& beams, const Projection& p) { Body::project(beams, p); }    \
-    target static void cells(const Beams& beams, float y, float z, float offset, float last,            \
-                             std::int32_t* cell) {                                                      \
-      Body::cells(beams, y, z, offset, last, cell);                                                     \
-    }                                                                                                   \
-    target static void see(const Beams& beams, std::size_t first, std::size_t last, float y, float z) { \
-      Body::see(beams, first, last, y, z);                                                              \
-    }                                                                                                   \
-    target static void fit(const Beams& beams, const Projection& p, float gate, int unknowns,           \
-                           FitSums& sums) {                                                             \
-      Body::fit(beams, p, gate, unknowns, sums);                                                        \
-    }                                                                                                   \
-    target static void correlate(const std::uint16_t* histogram, const std::int32_t* start,             \
-                                 const float* weight, std::size_t cell_count, float* out,               \
-                                 std::size_t size) {                                                    \
-      Body::correlate(histogram, start, weight, cell_count, out, size);                                 \
-    }                                                                                                   \
-    target static void smooth(const float* in, const float* tap, std::size_t taps, float* out,          \
-                              std::size_t size) {                                                       \
-      Body::smooth(in, tap, taps, out, size);                                                           \
-    }                                                                                                   \
-    target static float maximum(const float* in, std::size_t size) { return Body::maximum(in, size); }  \
-    static const BeamKernels& kernels(const char* name) {                                               \
-      static const BeamKernels all{name, load, project, cells, see, fit, correlate, smooth, maximum};   \
-      return all;                                                                                       \
-    }                                                                                                   \
+#define TUNNELRIG_FORM(form, width, target)                                                                 \
+  struct form {                                                                                             \
+    target static int load(const float* range, const Beams& beams, float least, float most) {               \
+      return Body<width>::load(range, beams, least, most);                                                  \
+    }                                                                                                       \
+    target static void project(const Beams& beams, const Projection& p) { Body<width>::project(beams, p); } \
+    target static void cells(const Beams& beams, float y, float z, float offset, float last,                \
+                             std::int32_t* cell) {                                                          \
+      Body<width>::cells(beams, y, z, offset, last, cell);                                                  \
+    }                                                                                                       \
+    target static void see(const Beams& beams, std::size_t first, std::size_t last, float y, float z) {     \
+      Body<width>::see(beams, first, last, y, z);                                                           \
+    }                                                                                                       \
+    target static void fit(const Beams& beams, const Projection& p, float gate, int unknowns,               \
+                           FitSums& sums) {                                                                 \
+      Body<width>::fit(beams, p, gate, unknowns, sums);                                                     \
+    }                                                                                                       \
+    target static void correlate(const std::uint16_t* histogram, const std::int32_t* start,                 \
+                                 const float* weight, std::size_t cell_count, float* out,                   \
+                                 std::size_t size) {                                                        \
+      Body<width>::correlate(histogram, start, weight, cell_count, out, size);                              \
+    }                                                                                                       \
+    target static void smooth(const float* in, const float* tap, std::size_t taps, float* out,              \
+                              std::size_t size) {                                                           \
+      Body<width>::smooth(in, tap, taps, out, size);                                                        \
+    }                                                                                                       \
+    target static float maximum(const float* in, std::size_t size) {                                        \
+      return Body<width>::maximum(in, size);                                                                \
+    }                                                                                                       \
+    static const BeamKernels& kernels(const char* name) {                                                   \
+      static const BeamKernels all{name, load, project, cells, see, fit, correlate, smooth, maximum};       \
+      return all;                                                                                           \
+    }                                                                                                       \
   };
 
-TUNNELRIG_FORM(Portable, )
+TUNNELRIG_FORM(Portable, Four, )
 #if TUNNELRIG_X86
-TUNNELRIG_FORM(Avx2, [[gnu::target("avx2")]])
-TUNNELRIG_FORM(Avx512, [[gnu::target("avx512f,avx512bw,avx512dq,avx512vl")]])
+TUNNELRIG_FORM(Avx2, Eight, [[gnu::target("avx2")]])
+TUNNELRIG_FORM(Avx512, Eight, [[gnu::target("avx512f,avx512bw,avx512dq,avx512vl")]])
 #endif
 
 }  // namespace

@@ -1,5 +1,5 @@
 // The matcher's inner loops, compiled for several instruction sets and chosen at run time. Every form adds up
-// in the same order, sixteen sums side by side and no fused products, so that all give the same bits on every
+// in the same order, eight sums side by side and no fused products, so that all give the same bits on every
 // machine.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 namespace tunnelrig {
 
-constexpr std::size_t kLanes = 16;
+constexpr std::size_t kLanes = 16;  // floats in a block
 
 struct alignas(64) Lanes {
   float value[kLanes];
@@ -55,6 +55,7 @@ struct FitSums {
   float normal[4][4] = {};  // JᵀJ, lower triangle
   float gradient[4] = {};   // Jᵀe
   float square = 0;         // eᵀe
+  float absolute = 0;       // Σ|e|
   float inliers = 0;        // beams within the gate
   float beyond = 0;         // beams that see through the expected wall
   float expected = 0;       // beams with a return and a wall to meet

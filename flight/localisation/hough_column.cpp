@@ -80,9 +80,16 @@ std::size_t HoughColumn::cell_of(double shift_m) const {
   return static_cast<std::size_t>(std::clamp(at, 0.0, static_cast<double>(score_.size() - 1)));
 }
 
-float HoughColumn::score_at(double shift_m) const {
-  const double at = std::round((shift_m - first_shift_m_) / cell_m_);
-  return at >= 0 && at < static_cast<double>(score_.size()) ? score_[static_cast<std::size_t>(at)] : 0;
+void HoughColumn::add_scores(const SectionPoint& from, const SectionPoint& step,
+                             std::span<float> into) const {
+  const auto first =
+      static_cast<float>((cosine_ * from.x() + sine_ * from.y() - first_shift_m_) / cell_m_ + 0.5);
+  const auto next = static_cast<float>((cosine_ * step.x() + sine_ * step.y()) / cell_m_);
+  const auto last = static_cast<float>(score_.size() - 1);
+  for (std::size_t i = 0; i < into.size(); ++i) {
+    const float at = std::clamp(first + next * static_cast<float>(i), 0.0F, last);
+    into[i] += score_[static_cast<std::size_t>(static_cast<std::int32_t>(at))];
+  }
 }
 
 /// A parabola through the highest cell and its neighbours.
@@ -97,12 +104,16 @@ HoughPeak HoughColumn::interpolated(std::size_t at) const {
   return {first_shift_m_ + cell_m_ * (static_cast<double>(at) + fraction), score_[at]};
 }
 
+float HoughColumn::height(const BeamKernels& kernels, double from_m, double to_m) const {
+  if (!(from_m <= to_m)) return 0;
+  const std::size_t first = cell_of(from_m);
+  return kernels.maximum(score_.data() + first, cell_of(to_m) + 1 - first);
+}
+
 HoughPeak HoughColumn::highest(const BeamKernels& kernels, double from_m, double to_m) const {
   if (!(from_m <= to_m)) return {};
-  const std::size_t first = cell_of(from_m);
-  const std::size_t size = cell_of(to_m) + 1 - first;
-  const float most = kernels.maximum(score_.data() + first, size);
-  const auto at = std::find(score_.begin() + static_cast<std::ptrdiff_t>(first), score_.end() - 1, most);
+  const auto from = score_.begin() + static_cast<std::ptrdiff_t>(cell_of(from_m));
+  const auto at = std::find(from, score_.end() - 1, height(kernels, from_m, to_m));
   return interpolated(static_cast<std::size_t>(at - score_.begin()));
 }
 

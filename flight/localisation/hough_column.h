@@ -27,16 +27,16 @@ class HoughColumn {
   /// Fills the scores for a scan whose beams have been projected.
   void correlate(const BeamKernels& kernels, const Beams& beams);
 
+  float height(const BeamKernels& kernels, double from_m, double to_m) const;  // the highest score
   HoughPeak highest(const BeamKernels& kernels, double from_m, double to_m) const;
 
   /// The highest scores between two shifts, at least `apart_m` from each other, best first, at most `most`.
   std::vector<HoughPeak> peaks(const BeamKernels& kernels, double from_m, double to_m, double apart_m,
                                std::size_t most) const;
 
-  float score_at(double shift_m) const;  // of the nearest cell; 0 outside of the section
+  /// Adds the score of the nearest cell at `from`, `from` + step, … to `into`.
+  void add_scores(const SectionPoint& from, const SectionPoint& step, std::span<float> into) const;
 
-  double cosine() const { return cosine_; }
-  double sine() const { return sine_; }
   double lowest_m() const { return first_shift_m_; }
   double highest_m() const { return first_shift_m_ + cell_m_ * static_cast<double>(score_.size() - 1); }
 

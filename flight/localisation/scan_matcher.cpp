@@ -143,6 +143,7 @@ struct ScanMatcher::Work {
   Beams beams;
   Eigen::Matrix2d attitude = Eigen::Matrix2d::Identity();  // the projection that the IMU gives
   int returned = 0;                                        // beams with a return
+  std::vector<float> sizes_m;                              // of residuals, where their median is needed
 
   Work(const CrossSection& the_section, const MatcherSettings& the_settings)
       : settings(the_settings),
@@ -209,14 +210,42 @@ struct ScanMatcher::Work {
     return best;
   }
 
+  /// Residuals of walls alone have a mean size of 0.80 of their RMS. Something else among them (an obstacle
+  /// not far before its wall) lowers that, and would raise a gate made from the RMS until it is let in.
+  static bool heavy_tailed(const FitSums& sums) {
+    constexpr float kGaussian = 0.797885F;
+    constexpr float kLeast_share = 0.9F;
+    return sums.absolute < kLeast_share * kGaussian * std::sqrt(sums.square * sums.inliers);
+  }
+
+  /// A gate from the median of the residuals within a wider one, which up to half of them may spoil.
+  double tight_gate_m(double gate_m) {
+    sizes_m.clear();
+    for (std::size_t i = 0; i < beams.count; ++i) {
+      if (!(beams.range[i] > 0 && beams.inverse[i] > 0)) continue;
+      const float size_m = std::abs(beams.range[i] - 1 / beams.inverse[i]);
+      if (size_m < static_cast<float>(gate_m)) sizes_m.push_back(size_m);
+    }
+    const auto middle = sizes_m.begin() + static_cast<std::ptrdiff_t>(sizes_m.size() / 2);
+    std::nth_element(sizes_m.begin(), middle, sizes_m.end());
+    constexpr double kSigma_of_median = 1.4826;
+    constexpr double kTight = 3;
+    return std::min(
+        gate_m, kTight * std::max(kSigma_of_median * static_cast<double>(*middle), settings.least_sigma_m));
+  }
+
   /// One Gauss–Newton step on the ranges of the beams within the gate; its length in m.
-  double step(Fit& fit, double gate_m, bool turned) {
+  double step(Fit& fit, double& gate_m, bool turned) {
     const Eigen::Matrix2d now = projection(fit.pose);
     if (turned) kernels.project(beams, narrowed(now));
     walls.look(kernels, beams, now, fit.pose.position);
     FitSums sums;
     const int size = unknowns();
     kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), size, sums);
+    if (heavy_tailed(sums)) {
+      gate_m = tight_gate_m(gate_m);
+      kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), size, sums);
+    }
     fit.inliers = sums.inliers;
     fit.beyond = sums.beyond;
     fit.solved = false;
@@ -358,6 +387,7 @@ Match ScanMatcher::match(const Scan& scan, const Attitude& attitude,
                          const std::optional<Eigen::Vector2d>& prior) {
   Work& work = *work_;
   work.take(scan, attitude);
+  if (prior && !prior->allFinite()) throw InputError::in("scan", "its prior is not finite");
   Fit fit;
   Rejection reason = Rejection::few_beams;
   if (work.returned >= static_cast<int>(work.settings.least_beams)) {

@@ -37,9 +37,8 @@ Found first_of(const std::vector<Start>& grid) {
 /// How high the best peak outside of `best ± apart` is.
 float rival(const HoughColumn& column, const BeamKernels& kernels, double from_m, double to_m,
             double best_m) {
-  const HoughPeak below = column.highest(kernels, from_m, best_m - kApart_m);
-  const HoughPeak above = column.highest(kernels, best_m + kApart_m, to_m);
-  return std::max(below.score, above.score);
+  return std::max(column.height(kernels, from_m, best_m - kApart_m),
+                  column.height(kernels, best_m + kApart_m, to_m));
 }
 
 }  // namespace
@@ -92,13 +91,15 @@ std::vector<Start> AllDirectionSearch::grid(const SearchBox& box) const {
   const Eigen::Vector2d size = box.highest - box.lowest;
   const auto steps_y = static_cast<int>(std::ceil(size.x() / step_m_));
   const auto steps_z = static_cast<int>(std::ceil(size.y() / step_m_));
+  std::vector<float> score(static_cast<std::size_t>(steps_z + 1));
   std::vector<Start> all;
-  for (int i = 0; i <= steps_y; ++i)
-    for (int j = 0; j <= steps_z; ++j) all.push_back({box.lowest + step_m_ * SectionPoint(i, j), 0});
-  for (const HoughColumn& column : columns_)
-    for (Start& start : all)
-      start.score +=
-          column.score_at(column.cosine() * start.position.x() + column.sine() * start.position.y());
+  for (int i = 0; i <= steps_y; ++i) {
+    const SectionPoint from = box.lowest + SectionPoint(step_m_ * i, 0);
+    std::fill(score.begin(), score.end(), 0.0F);
+    for (const HoughColumn& column : columns_) column.add_scores(from, {0, step_m_}, score);
+    for (int j = 0; j <= steps_z; ++j)
+      all.push_back({from + SectionPoint(0, step_m_ * j), score[static_cast<std::size_t>(j)]});
+  }
   return all;
 }
 

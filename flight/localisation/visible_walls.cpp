@@ -29,8 +29,6 @@ VisibleWalls::VisibleWalls(const CrossSection& section, const BeamLayout& layout
 void VisibleWalls::look(const BeamKernels& kernels, const Beams& beams, const Eigen::Matrix2d& projection,
                         const SectionPoint& from) {
   std::fill_n(beams.inverse, beams.padded, 0.0F);
-  std::fill_n(beams.wall_y, beams.padded, 0.0F);
-  std::fill_n(beams.wall_z, beams.padded, 0.0F);
 
   // Seen from the scan plane, where the beams are evenly spread, the section is an affine picture of itself.
   const Eigen::Matrix2d to_plane = projection.inverse();

@@ -17,8 +17,8 @@ class VisibleWalls {
  public:
   VisibleWalls(const CrossSection& section, const BeamLayout& layout);
 
-  /// Fills wall_y, wall_z and inverse of beams whose directions have been projected with the same
-  /// `projection`.
+  /// Fills inverse and, where that is not 0, wall_y and wall_z of beams whose directions have been projected
+  /// with the same `projection`.
   void look(const BeamKernels& kernels, const Beams& beams, const Eigen::Matrix2d& projection,
             const SectionPoint& from);
 

@@ -27,14 +27,22 @@ struct Room {
   }
 };
 
-/// Upper left corner to the lower right one and back with ±0.1 m/s² (6.3, Figure 6.8).
-Trajectory diagonal(const Room& room) {
+/// Upper left corner to the lower right one and back with ±0.1 m/s² (6.3, Figure 6.8), as far into the
+/// corners as the section lets the vehicle.
+Trajectory diagonal(const Room& room, const FlightSpace& space, const Airframe& frame) {
+  const auto fits = [&](const Plane& at) {
+    return space.walls.inside(at) && find_touch(space.walls, frame, at[0], at[1], 0, 1).depth_m <= 0;
+  };
+  double share = 0.7;
+  while (share > 0.1 &&
+         !(fits(room.at(-share - 0.1, share + 0.1)) && fits(room.at(share + 0.1, -share - 0.1))))
+    share -= 0.1;
   Trajectory path;
-  path.hold(room.at(-0.7, 0.7), 3);
-  path.move(room.at(0.7, -0.7), 0.1);
-  path.hold(room.at(0.7, -0.7), 3);
-  path.move(room.at(-0.7, 0.7), 0.1);
-  path.hold(room.at(-0.7, 0.7), 3);
+  path.hold(room.at(-share, share), 3);
+  path.move(room.at(share, -share), 0.1);
+  path.hold(room.at(share, -share), 3);
+  path.move(room.at(-share, share), 0.1);
+  path.hold(room.at(-share, share), 3);
   return path;
 }
 
@@ -99,7 +107,7 @@ Scenario scenario_from(const std::string& name, const FlightSpace& space, const 
   if (name == "hover") {
     scenario.trajectory.hold(room.middle, 30);
   } else if (name == "diagonal") {
-    scenario.trajectory = diagonal(room);
+    scenario.trajectory = diagonal(room, space, frame);
   } else if (name == "ladder") {
     scenario.trajectory = ladder(room);
   } else if (name == "circle") {

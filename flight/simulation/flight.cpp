@@ -65,14 +65,13 @@ void SimulatedVehicle::meet_walls(double time_s, FlightScore& score) {
     score.contacts.push_back({time_s, centre[0], centre[1], touch.at[0], touch.at[1], speed});
 }
 
-ControllerContext controller_context(const FlightSetup& setup, double map_share) {
+ControllerContext controller_context(const FlightSetup& setup) {
   const Airframe& frame = setup.believed;
   return {.mass_kg = frame.mass_kg,
           .rotor_offset_m = frame.rotor_offset_m(),
           .full_thrust_m_s2 = kRotors * frame.largest_thrust_N / frame.mass_kg,
           .map = setup.map,
-          .scale = setup.scale,
-          .map_share = map_share};
+          .scale = setup.scale};
 }
 
 template FlightScore fly<GivenPosition>(const FlightSetup&, GivenPosition&, AnyController&, FlightLog*);

@@ -83,6 +83,6 @@ FlightScore fly(const FlightSetup& setup, Estimator& estimator, AnyController& c
                 FlightLog* log = nullptr);
 
 /// What a controller may know in this flight.
-ControllerContext controller_context(const FlightSetup& setup, double map_share = 1);
+ControllerContext controller_context(const FlightSetup& setup);
 
 }  // namespace tunnelrig

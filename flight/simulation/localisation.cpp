@@ -88,10 +88,12 @@ void Localisation::correct() {
   bool used = match.accepted;
   if (used) {
     const double age_s = settings_.cycles_of_latency * kControlStep_s + 0.5 * settings_.lidar.sweep_s;
-    used = filter_
-               ->correct(match.position_m,
-                         match.covariance_m2 + skew_m_ * skew_m_ * Eigen::Matrix2d::Identity(), age_s)
-               .accepted;
+    constexpr double kBlindSpot_m2 = 0.1;  // what it leaves of the effect in the centre
+    const double turned = settings_.attitude_sigma_rad * settings_.attitude_sigma_rad *
+                          (match.position_m.squaredNorm() + kBlindSpot_m2);
+    used =
+        filter_->correct(match.position_m, match.covariance_m2 + turned * Eigen::Matrix2d::Identity(), age_s)
+            .accepted;
   }
   if (!used) ++rejected_;
 }

@@ -17,11 +17,12 @@ struct LocalisationSettings {
   LidarSettings lidar;
   int cycles_per_scan = 10;   // 40 Hz
   int cycles_of_latency = 4;  // from the sweep's end to the correction: transfer and matching, 10 ms; assumed
-  AugmentedModel model;       // what the walls do would otherwise look like motion to it
-  double skew_share =
-      0.5;  // of a sweep's roll times half the height, as a match's further standard deviation
-  double roll_sigma_rad = 0.0035;  // of the attitude estimate's constant error, which no scan shows
+  /// Not the accelerometer's noise alone: the attitude's error leaves an acceleration of g times it, which
+  /// the filter must be allowed to correct.
+  KinematicModel model = {.acceleration_variance_m2_s4 = 0.45};
   GateSettings gate;
+  double attitude_sigma_rad =
+      0.0035;  // turns the scan, which moves the match by it times the distance from the centre
 };
 
 /// Positions in the flight frame (z above the floor). `space` must outlive it.

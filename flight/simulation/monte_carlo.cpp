@@ -23,7 +23,8 @@ double student_975(int degrees) {
 /// One worker's vehicle, field, estimator and controller; run() may be called for any runs in any order.
 class Worker {
  public:
-  Worker(const FlightTask& task, const DisturbanceField* map, std::string_view controller, const GainTable& gains)
+  Worker(const FlightTask& task, const DisturbanceField* map, std::string_view controller,
+         const GainTable& gains)
       : task_(task), map_(map) {
     setup_.believed = task.believed;
     setup_.map = map;
@@ -32,7 +33,7 @@ class Worker {
     setup_.trajectory = &task.scenario->trajectory;
     setup_.score_from_s = task.scenario->score_from_s;
     setup_.seed = task.seed;
-    controller_.emplace(controller, gains, controller_context(setup_, map_share(controller)));
+    controller_.emplace(controller, gains, controller_context(setup_));
     if (task.localisation) localisation_.emplace(*task.space, *task.localisation);
   }
 
@@ -47,8 +48,6 @@ class Worker {
   }
 
  private:
-  static double map_share(std::string_view controller) { return controller == "ibs-map-off" ? 0 : 1; }
-
   void draw(std::uint64_t number) {
     Random random(task_.seed, 4 * number + 2);
     const Spread& spread = task_.spread;
@@ -60,11 +59,13 @@ class Worker {
     for (double& scale : setup_.rotor_scale) scale = 1 + spread.rotor_thrust * random.normal();
     setup_.rotor_scale[static_cast<std::size_t>(hidden.weak_rotor - 1)] *= 1 - hidden.motor_loss;
     setup_.inertial.roll_error_rad = spread.roll_error_rad * random.normal();
-    for (double& bias : setup_.inertial.accelerometer_bias_m_s2) bias = spread.accelerometer_bias_m_s2 * random.normal();
+    for (double& bias : setup_.inertial.accelerometer_bias_m_s2)
+      bias = spread.accelerometer_bias_m_s2 * random.normal();
     setup_.air = task_.air;
     setup_.air.wind_m_s += hidden.wind_m_s;
     if (task_.map == nullptr) return;
-    const double thrust_error = spread.map_errors * random.normal(), uneven_error = spread.map_errors * random.normal();
+    const double thrust_error = spread.map_errors * random.normal(),
+                 uneven_error = spread.map_errors * random.normal();
     if (spread.map_errors == 0 && hidden.map_scale == 1) {
       setup_.field = map_;
       return;
@@ -82,20 +83,21 @@ class Worker {
 };
 
 RunResult result_of(const FlightScore& score) {
-  return {.rms_y_m = score.tracking[0].rms_m(),
-          .rms_z_m = score.tracking[1].rms_m(),
-          .largest_y_m = score.tracking[0].largest_m(),
-          .largest_z_m = score.tracking[1].largest_m(),
-          .estimator_rms_m = std::hypot(score.estimator[0].rms_m(), score.estimator[1].rms_m()) / std::sqrt(2.0),
-          .nees = score.nees,
-          .effort_N = score.effort_N,
-          .saturated_s = score.saturated_s,
-          .clamped_s = score.clamped_s,
-          .contacts = score.contact_count,
-          .matches = score.matches,
-          .rejected_matches = score.rejected_matches,
-          .lost = score.lost,
-          .touched = score.contacts};
+  return {
+      .rms_y_m = score.tracking[0].rms_m(),
+      .rms_z_m = score.tracking[1].rms_m(),
+      .largest_y_m = score.tracking[0].largest_m(),
+      .largest_z_m = score.tracking[1].largest_m(),
+      .estimator_rms_m = std::hypot(score.estimator[0].rms_m(), score.estimator[1].rms_m()) / std::sqrt(2.0),
+      .nees = score.nees,
+      .effort_N = score.effort_N,
+      .saturated_s = score.saturated_s,
+      .clamped_s = score.clamped_s,
+      .contacts = score.contact_count,
+      .matches = score.matches,
+      .rejected_matches = score.rejected_matches,
+      .lost = score.lost,
+      .touched = score.contacts};
 }
 
 void summarise(Comparison& all) {
@@ -166,7 +168,8 @@ Comparison fly_runs(const FlightTask& task, std::string_view controller, const G
         const FlightScore score = worker.run(run, nullptr);
         const std::scoped_lock lock(mutex);
         all.runs[static_cast<std::size_t>(run)] = result_of(score);
-        // Counts do not care in which order they are added; everything else is added up in the order of the runs.
+        // Counts do not care in which order they are added; everything else is added up in the order of the
+        // runs.
         for (std::size_t i = 0; i < 2; ++i) pooled[i].add(score.tracking[i]);
         if (progress) progress(++done);
       }

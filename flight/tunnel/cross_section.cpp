@@ -52,6 +52,9 @@ void check_vertices(std::span<const SectionPoint> vertices, const std::string& n
     if (!point.allFinite() || point.cwiseAbs().maxCoeff() > kLargest_m)
       throw InputError::in(name, "vertex {} is ({}, {}) m: coordinates are finite and within {} m", i + 1,
                            point.x(), point.y(), kLargest_m);
+  }
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const SectionPoint& point = vertices[i];
     const SectionPoint& next = vertices[(i + 1) % vertices.size()];
     if (!((next - point).norm() >= kShortest_edge_m))
       throw InputError::in(name,

@@ -68,7 +68,14 @@ Touch find_touch(const Walls& walls, const Airframe& frame, double y_m, double z
       if (walls.inside(corner)) continue;
       std::size_t edge = 0;
       const double depth = walls.distance(corner, &edge);
-      if (depth > deepest.depth_m) deepest = {corner, walls.edges()[edge].inward, depth};
+      const Point& normal = walls.edges()[edge].inward;
+      constexpr double kLevel_m = 1e-4;
+      if (deepest.depth_m > 0 && std::abs(depth - deepest.depth_m) < kLevel_m && normal == deepest.normal) {
+        // A side that meets the wall flat is hit in its middle, not at whichever corner came first.
+        deepest.at = {0.5 * (deepest.at[0] + corner[0]), 0.5 * (deepest.at[1] + corner[1])};
+      } else if (depth > deepest.depth_m) {
+        deepest = {corner, normal, depth};
+      }
     }
   }
   for (const Walls::Edge& edge : walls.edges()) {

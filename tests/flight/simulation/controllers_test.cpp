@@ -120,8 +120,8 @@ std::vector<std::string> names() {
   return result;
 }
 
-INSTANTIATE_TEST_SUITE_P(All, EveryController, testing::ValuesIn(names()), [](const auto& info) {
-  std::string name = info.param;
+INSTANTIATE_TEST_SUITE_P(All, EveryController, testing::ValuesIn(names()), [](const auto& chosen) {
+  std::string name = chosen.param;
   std::replace(name.begin(), name.end(), '-', '_');
   return name;
 });
