@@ -59,7 +59,6 @@ struct EstimatorInput {
   const RigidState* truth = nullptr;  // for simulated sensors only
   EulerAngles attitude;               // as estimated
   Plane acceleration_m_s2{};          // as measured
-  Plane modelled_m_s2{};              // as commanded thrust, mass and attitude make it
 };
 
 struct PlanarEstimate {

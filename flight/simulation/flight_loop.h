@@ -100,27 +100,23 @@ FlightScore fly(const FlightSetup& setup, Estimator& estimator, AnyController& c
   estimator.start(vehicle.state());
   const double hover_N = setup.believed.mass_kg * kGravity_m_s2 / kRotors;
   const auto cycles = static_cast<long>(std::ceil(setup.trajectory->duration_s() * kControlRate_Hz));
-  const double motor_share = 1 - std::exp(-kControlStep_s / setup.believed.motor_lag_s);
-  double effort = 0, acting_m_s2 = kGravity_m_s2;  // thrust as the motors are believed to follow
+  double effort = 0;
   long cycle = 0;
   for (; cycle < cycles && !score.lost; ++cycle) {
     const double time_s = static_cast<double>(cycle) * kControlStep_s;
     const RigidState& state = vehicle.state();
     inertial.measure(state);
+    const PlanarEstimate estimate =
+        estimator.step({time_s, &state, inertial.attitude().angles, inertial.acceleration_m_s2()});
     ControlInput in{.reference = setup.trajectory->at(time_s),
+                    .position_m = estimate.position_m,
+                    .velocity_m_s = estimate.velocity_m_s,
                     .acceleration_m_s2 = inertial.acceleration_m_s2()};
     inertial.tilt(state, in);
-    const Plane modelled = {-acting_m_s2 * in.sin_roll, acting_m_s2 * in.cos_tilt - kGravity_m_s2};  // (3.5)
-    const PlanarEstimate estimate =
-        estimator.step({time_s, &state, inertial.attitude().angles, in.acceleration_m_s2, modelled});
-    in.position_m = estimate.position_m;
-    in.velocity_m_s = estimate.velocity_m_s;
     const ControlOutput out = controller.step(in);
     const PerRotor thrust_N =
         attitude.step({out.roll_rad, pilot_pitch(setup.pilot, state), out.thrust_m_s2, out.roll_moment_N_m},
                       inertial.attitude());
-    const double commanded_N = thrust_N[0] + thrust_N[1] + thrust_N[2] + thrust_N[3];
-    acting_m_s2 += motor_share * (commanded_N / setup.believed.mass_kg - acting_m_s2);
     for (const double t : thrust_N) effort += (t - hover_N) * (t - hover_N);
     if (time_s >= setup.score_from_s) {
       for (std::size_t i = 0; i < 2; ++i) {

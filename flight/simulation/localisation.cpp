@@ -24,7 +24,6 @@ MatcherSettings matcher_settings(const Tunnel& tunnel, const LidarSettings& lida
 Localisation::Localisation(const FlightSpace& space, const LocalisationSettings& settings)
     : floor_m_(space.floor_m),
       settings_(settings),
-      middle_m_(0.5 * (space.tunnel.section.lowest() + space.tunnel.section.highest())),
       section_(&space.tunnel.section),
       matcher_(space.tunnel.section, matcher_settings(space.tunnel, settings.lidar)) {}
 
@@ -49,12 +48,7 @@ PlanarEstimate Localisation::step(const EstimatorInput& in) {
       {{truth.position_m[1], truth.position_m[2] + floor_m_},
        {true_angles.roll_rad, true_angles.pitch_rad, true_angles.yaw_rad}},
       {in.attitude.roll_rad, in.attitude.pitch_rad, in.attitude.yaw_rad}};
-  if (cycle_ > 0) {
-    AugmentedModel::Input input;
-    input.modelled_m_s2 = Eigen::Vector2d(in.modelled_m_s2[0], in.modelled_m_s2[1]);
-    input.measured_m_s2 = Eigen::Vector2d(in.acceleration_m_s2[0], in.acceleration_m_s2[1]);
-    filter_->predict(input, kControlStep_s);
-  }
+  if (cycle_ > 0) filter_->predict({in.acceleration_m_s2[0], in.acceleration_m_s2[1]}, kControlStep_s);
   const long phase = cycle_ % settings_.cycles_per_scan;
   if (cycle_ >= settings_.cycles_per_scan && phase == 0) take_scan();
   if (waiting_ && phase == settings_.cycles_of_latency) correct();
@@ -74,10 +68,6 @@ void Localisation::take_scan() {
   const Attitude &from = at(cycle_ - cycles).measured, &to = at(cycle_).measured;
   scan_attitude_ = {0.5 * (from.roll_rad + to.roll_rad), 0.5 * (from.pitch_rad + to.pitch_rad),
                     0.5 * (from.yaw_rad + to.yaw_rad)};
-  // A wall at the sweep's beginning and the one at its end are seen from places and attitudes apart by its
-  // motion; the matcher, told of one attitude, takes a mean of the two that leans towards the nearer wall.
-  skew_m_ = settings_.skew_share * (filter_->velocity_m_s().norm() * settings_.lidar.sweep_s +
-                                    std::abs(to.roll_rad - from.roll_rad) * 0.5 * section_->height_m());
   waiting_ = true;
 }
 
@@ -102,18 +92,9 @@ void Localisation::correct() {
 void Localisation::judge(const RigidState& truth) {
   if (cycle_ % settings_.cycles_per_scan != 0) return;
   const auto& v = truth.velocity_m_s;
-  const Eigen::Vector4d state = filter_->state().head<4>();
   const Eigen::Vector4d error =
-      Eigen::Vector4d(truth.position_m[1], truth.position_m[2] + floor_m_, v[1], v[2]) - state;
-  // A constant error of the attitude turns every scan about the LIDAR, and so the estimate about the
-  // section's middle: the filter cannot see it, and takes it into account as known by its variance (Schmidt
-  // 1966).
-  const Eigen::Vector2d from_middle = state.head<2>() - middle_m_;
-  const Eigen::Vector4d turned(-from_middle.y(), from_middle.x(), -state(3), state(2));
-  const Eigen::Matrix4d covariance =
-      filter_->covariance().topLeftCorner<4, 4>() +
-      settings_.roll_sigma_rad * settings_.roll_sigma_rad * turned * turned.transpose();
-  nees_sum_ += error.dot(covariance.inverse() * error);
+      Eigen::Vector4d(truth.position_m[1], truth.position_m[2] + floor_m_, v[1], v[2]) - filter_->state();
+  nees_sum_ += error.dot(filter_->covariance().inverse() * error);
   ++nees_count_;
 }
 

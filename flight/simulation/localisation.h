@@ -51,14 +51,12 @@ class Localisation {
 
   double floor_m_;
   LocalisationSettings settings_;
-  Eigen::Vector2d middle_m_{0, 0};  // of the section's bounding box
   const CrossSection* section_;
   ScanMatcher matcher_;
   std::optional<SimulatedLidar> lidar_;
-  std::optional<AugmentedFilter> filter_;
+  std::optional<KalmanFilter> filter_;
   Scan scan_;
   Attitude scan_attitude_;
-  double skew_m_ = 0;
   std::array<Moment, kRemembered> moments_;
   long cycle_ = 0;
   bool waiting_ = false;
