@@ -28,8 +28,8 @@ RigidState unpack(const Vector& v) {
   return s;
 }
 
-inline void derive(const Vector& s, const BodyConstants& b, const RotorLoads& loads, double wind_m_s,
-                   Vector& d) {
+[[gnu::always_inline]] inline void derive(const Vector& s, const BodyConstants& b, const RotorLoads& loads,
+                                          double wind_m_s, Vector& d) {
   const double vx = s[3] - wind_m_s, vy = s[4], vz = s[5];
   const double qw = s[6], qx = s[7], qy = s[8], qz = s[9];
   const double wx = s[10], wy = s[11], wz = s[12];
@@ -54,7 +54,7 @@ inline void derive(const Vector& s, const BodyConstants& b, const RotorLoads& lo
           b.per_inertia[2];
 }
 
-inline Vector along(const Vector& s, const Vector& d, double step) {
+[[gnu::always_inline]] inline Vector along(const Vector& s, const Vector& d, double step) {
   Vector r;
   for (std::size_t i = 0; i < kNumbers; ++i) r[i] = s[i] + step * d[i];
   return r;
@@ -72,6 +72,11 @@ BodyConstants::BodyConstants(const Airframe& frame)
       drag_along(frame.linear_drag_N_s_m[1]),
       drag_quadratic(frame.quadratic_drag_N_s2_m2) {}
 
+// Wider registers where there are some; no fused products, so that all machines give the same bits.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
+__attribute__((target_clones("avx2", "default")))
+#endif
 void rk4_step(RigidState& state, const BodyConstants& body, const StepLoads& loads, double wind_m_s,
               double step_s) {
   const Vector s = pack(state);
