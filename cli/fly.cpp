@@ -30,7 +30,8 @@ struct NamedMap {
 };
 
 NamedMap map_of(const Options& options) {
-  if (options.map.empty()) return {published_disturbance_map(), "published_field (simulated; no measured map was given)"};
+  if (options.map.empty())
+    return {published_disturbance_map(), "published_field (simulated; no measured map was given)"};
   return {read_disturbance_map(options.map), options.map};
 }
 
@@ -42,12 +43,13 @@ std::vector<std::string> controllers_of(const Options& options) {
 }
 
 /// Flies one scenario; `gains` and `map` are shared by all.
-FlownScenario fly_scenario(const Options& options, const std::string& tunnel, const std::string& scenario_name,
-                           const NamedMap& map, const GainTable& gains) {
+FlownScenario fly_scenario(const Options& options, const std::string& tunnel,
+                           const std::string& scenario_name, const NamedMap& map, const GainTable& gains) {
   const Airframe frame;
   const FlightSpace space(tunnel_from(tunnel), frame);
   const Scenario scenario = scenario_from(scenario_name, space, frame);
-  FlightTask task{.space = &space, .scenario = &scenario, .map = &map.map, .believed = frame, .hidden = options.hidden};
+  FlightTask task{
+      .space = &space, .scenario = &scenario, .map = &map.map, .believed = frame, .hidden = options.hidden};
   task.runs = options.runs;
   task.workers = options.workers;
   task.seed = options.seed;
@@ -64,7 +66,8 @@ FlownScenario fly_scenario(const Options& options, const std::string& tunnel, co
   ProgressBar progress("flying");
   for (std::size_t i = 0; i < names.size(); ++i) {
     flown.controllers.push_back(fly_runs(task, names[i], gains, [&](int done) {
-      progress.show(static_cast<double>(i) * options.runs + done, static_cast<double>(names.size()) * options.runs, names[i]);
+      progress.show(static_cast<double>(i) * options.runs + done,
+                    static_cast<double>(names.size()) * options.runs, names[i]);
     }));
     if (!options.out.empty()) flown.logs.push_back(fly_logged(task, names[i], gains));
   }
@@ -92,8 +95,9 @@ int tune_all(const Options& options) {
     fmt::print("{}: cost {:.2f} mm, {:.2f} mm with the defaults\n", name, 1e3 * tuned.back().cost_m,
                1e3 * tuned.back().start_cost_m);
   }
-  write_text(options.tune, format_gains(tuned, fmt::format("# Made by: {}\n# Map: {}. docs/flight.md says how.\n",
-                                                           arguments(), map.name)));
+  write_text(options.tune,
+             format_gains(tuned, fmt::format("# Made by: {}\n# Map: {}. docs/flight.md says how.\n",
+                                             arguments(), map.name)));
   return kWell;
 }
 
@@ -103,19 +107,26 @@ int run(const Options& options) {
     throw InputError(fmt::format("--position {}: must be lidar or given", options.position));
   if (!options.tune.empty()) return tune_all(options);
   const NamedMap map = map_of(options);
-  const GainTable gains = options.gains.empty() ? frozen_gains() : parse_gains(read_text(options.gains), options.gains);
+  const GainTable gains =
+      options.gains.empty() ? frozen_gains() : parse_gains(read_text(options.gains), options.gains);
   const bool programme = options.scenario == "all";
   std::vector<FlownScenario> flown;
   fmt::print("SIMULATED flights; map: {}\n\n", map.name);
   if (programme) {
-    for (const auto& [tunnel, scenario] : std::initializer_list<std::pair<const char*, const char*>>{
-             {"2.4", "hover"}, {"2.4", "diagonal"}, {"2.4", "ladder"}, {"2.4", "circle"}, {"1.5", "circle"}, {"railway", "waypoints"}}) {
+    for (const auto& [tunnel, scenario] :
+         std::initializer_list<std::pair<const char*, const char*>>{{"2.4", "hover"},
+                                                                    {"2.4", "diagonal"},
+                                                                    {"2.4", "ladder"},
+                                                                    {"2.4", "circle"},
+                                                                    {"1.5", "circle"},
+                                                                    {"railway", "waypoints"}}) {
       flown.push_back(fly_scenario(options, tunnel, scenario, map, gains));
       print_flown(flown.back());
     }
     print_beside_thesis(flown);
   } else {
-    flown.push_back(fly_scenario(options, options.tunnel.empty() ? "1.5" : options.tunnel, options.scenario, map, gains));
+    flown.push_back(
+        fly_scenario(options, options.tunnel.empty() ? "1.5" : options.tunnel, options.scenario, map, gains));
     print_flown(flown.back());
   }
   if (!options.json.empty()) write_text(options.json, flown_json(flown, map.name, options.seed, programme));
@@ -126,7 +137,8 @@ int run(const Options& options) {
 
 void add_fly(CLI::App& app, Work& work) {
   auto options = std::make_shared<Options>();
-  CLI::App* verb = app.add_subcommand("fly", "Fly a map: controllers through the thesis's scenarios, simulated");
+  CLI::App* verb =
+      app.add_subcommand("fly", "Fly a map: controllers through the thesis's scenarios, simulated");
   verb->footer(
       "Everything flown is simulated; docs/flight.md.\n\n"
       "Examples: tunnelrig fly --map maps/disturbance_map.json --scenario circle --out flights\n"
@@ -134,16 +146,22 @@ void add_fly(CLI::App& app, Work& work) {
       "          tunnelrig fly --tune gains.toml && tunnelrig fly --gains gains.toml");
   verb->add_option("--map", options->map, "disturbance_map.json; without it the published field, simulated");
   verb->add_option("--tunnel", options->tunnel, "1.5, 2.4, railway or a file (default 1.5)");
-  verb->add_option("--scenario", options->scenario,
-                   "hover, diagonal, ladder, circle, waypoints, training, a file, or all (the thesis's programme)")
+  verb->add_option(
+          "--scenario", options->scenario,
+          "hover, diagonal, ladder, circle, waypoints, training, a file, or all (the thesis's programme)")
       ->capture_default_str();
-  verb->add_option("--controllers", options->controllers, "Names with commas between; all of them otherwise")->delimiter(',');
-  verb->add_option("--runs", options->runs, "Flights of each")->check(CLI::Range(1, 100000))->capture_default_str();
+  verb->add_option("--controllers", options->controllers, "Names with commas between; all of them otherwise")
+      ->delimiter(',');
+  verb->add_option("--runs", options->runs, "Flights of each")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   verb->add_option("--seed", options->seed, "Of all that is random")->capture_default_str();
-  verb->add_option("--workers", options->workers, "Threads; 0 is one per core. The results do not depend on it")
+  verb->add_option("--workers", options->workers,
+                   "Threads; 0 is one per core. The results do not depend on it")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
-  verb->add_option("--position", options->position, "lidar (scans, matcher, filter) or given (exact)")->capture_default_str();
+  verb->add_option("--position", options->position, "lidar (scans, matcher, filter) or given (exact)")
+      ->capture_default_str();
   verb->add_option("--lidar-sigma-mm", options->lidar_sigma_mm, "Range noise of the LIDAR")
       ->check(CLI::Range(0.0, 500.0))
       ->capture_default_str();
@@ -154,10 +172,13 @@ void add_fly(CLI::App& app, Work& work) {
   verb->add_option("--budget", options->budget, "With --tune: evaluations per controller")
       ->check(CLI::Range(10, 100000))
       ->capture_default_str();
-  verb->add_option("--payload-kg", options->hidden.payload_kg, "Undeclared: mass that no controller knows of");
-  verb->add_option("--map-scale", options->hidden.map_scale, "Undeclared: the field is so many times the map");
+  verb->add_option("--payload-kg", options->hidden.payload_kg,
+                   "Undeclared: mass that no controller knows of");
+  verb->add_option("--map-scale", options->hidden.map_scale,
+                   "Undeclared: the field is so many times the map");
   verb->add_option("--wind-m-s", options->hidden.wind_m_s, "Undeclared: steady wind along the tunnel");
-  verb->add_option("--motor-loss", options->hidden.motor_loss, "Undeclared: share of its thrust that a rotor lost");
+  verb->add_option("--motor-loss", options->hidden.motor_loss,
+                   "Undeclared: share of its thrust that a rotor lost");
   verb->add_option("--weak-rotor", options->hidden.weak_rotor, "Which rotor that is, 1 to 4");
   verb->callback([options, &work] { work = [options] { return run(*options); }; });
 }

@@ -19,7 +19,8 @@ std::string contacts_text(const Comparison& c) {
   if (c.contacts == 0) return "0";
   const ContactEvent* first = nullptr;
   for (const RunResult& run : c.runs) {
-    if (!run.touched.empty() && (first == nullptr || run.touched[0].time_s < first->time_s)) first = &run.touched[0];
+    if (!run.touched.empty() && (first == nullptr || run.touched[0].time_s < first->time_s))
+      first = &run.touched[0];
   }
   return fmt::format("{} in {} runs, first at {:.2f} s, ({:.0f}, {:.0f}) mm", c.contacts, c.runs_with_contact,
                      first->time_s, kMm * first->y_m, kMm * first->z_m);
@@ -74,16 +75,19 @@ constexpr Printed kPrinted[] = {
 
 std::string comparison_csv(const FlownScenario& flown) {
   std::string text =
-      "controller,runs,rms_y_mm,rms_z_mm,max_y_mm,max_z_mm,p95_y_mm,p95_z_mm,ci95_low_mm,ci95_high_mm,contacts,"
-      "runs_with_contact,lost,effort_N,thrust_saturated_s,outside_map_s,estimator_rms_mm,nees,rejected_share\n";
+      "controller,runs,rms_y_mm,rms_z_mm,max_y_mm,max_z_mm,p95_y_mm,p95_z_mm,ci95_low_mm,ci95_high_mm,"
+      "contacts,"
+      "runs_with_contact,lost,effort_N,thrust_saturated_s,outside_map_s,estimator_rms_mm,nees,rejected_"
+      "share\n";
   for (const Comparison& c : flown.controllers) {
-    fmt::format_to(std::back_inserter(text),
-                   "{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{},{:.5f},{:.4f},{:.4f},{:.4f},"
-                   "{:.4f},{:.5f}\n",
-                   c.controller, c.runs.size(), kMm * c.rms_y_m, kMm * c.rms_z_m, kMm * c.largest_y_m,
-                   kMm * c.largest_z_m, kMm * c.p95_y_m, kMm * c.p95_z_m, kMm * c.ci95_low_m, kMm * c.ci95_high_m,
-                   c.contacts, c.runs_with_contact, c.lost, c.effort_N, c.saturated_s, c.clamped_s,
-                   kMm * c.estimator_rms_m, c.nees, c.rejected_share);
+    fmt::format_to(
+        std::back_inserter(text),
+        "{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{},{:.5f},{:.4f},{:.4f},{:.4f},"
+        "{:.4f},{:.5f}\n",
+        c.controller, c.runs.size(), kMm * c.rms_y_m, kMm * c.rms_z_m, kMm * c.largest_y_m,
+        kMm * c.largest_z_m, kMm * c.p95_y_m, kMm * c.p95_z_m, kMm * c.ci95_low_m, kMm * c.ci95_high_m,
+        c.contacts, c.runs_with_contact, c.lost, c.effort_N, c.saturated_s, c.clamped_s,
+        kMm * c.estimator_rms_m, c.nees, c.rejected_share);
   }
   return text;
 }
@@ -93,26 +97,31 @@ std::string comparison_csv(const FlownScenario& flown) {
 void print_flown(const FlownScenario& flown) {
   fmt::print("{} in the {} tunnel, {} runs\n", flown.scenario, flown.tunnel,
              flown.controllers.empty() ? 0 : flown.controllers[0].runs.size());
-  Table table({"controller", "rms y [mm]", "rms z [mm]", "max y [mm]", "max z [mm]", "p95 y [mm]", "p95 z [mm]",
-               "mean rms, 95 % [mm]", "effort [N]", "saturated [s]", "estimator [mm]", "NEES/4", "contacts"});
+  Table table({"controller", "rms y [mm]", "rms z [mm]", "max y [mm]", "max z [mm]", "p95 y [mm]",
+               "p95 z [mm]", "mean rms, 95 % [mm]", "effort [N]", "saturated [s]", "estimator [mm]", "NEES/4",
+               "contacts"});
   for (const Comparison& c : flown.controllers) {
     const auto mm = [](double m) { return fmt::format("{:.1f}", kMm * m); };
-    table.add({c.controller, mm(c.rms_y_m), mm(c.rms_z_m), mm(c.largest_y_m), mm(c.largest_z_m), mm(c.p95_y_m),
-               mm(c.p95_z_m), fmt::format("{:.1f} to {:.1f}", kMm * c.ci95_low_m, kMm * c.ci95_high_m),
-               fmt::format("{:.2f}", c.effort_N), fmt::format("{:.2f}", c.saturated_s),
-               fmt::format("{:.1f}", kMm * c.estimator_rms_m), c.nees > 0 ? fmt::format("{:.2f}", c.nees / 4) : "-",
-               contacts_text(c) + (c.lost > 0 ? fmt::format("; {} lost", c.lost) : "")});
+    table.add(
+        {c.controller, mm(c.rms_y_m), mm(c.rms_z_m), mm(c.largest_y_m), mm(c.largest_z_m), mm(c.p95_y_m),
+         mm(c.p95_z_m), fmt::format("{:.1f} to {:.1f}", kMm * c.ci95_low_m, kMm * c.ci95_high_m),
+         fmt::format("{:.2f}", c.effort_N), fmt::format("{:.2f}", c.saturated_s),
+         fmt::format("{:.1f}", kMm * c.estimator_rms_m), c.nees > 0 ? fmt::format("{:.2f}", c.nees / 4) : "-",
+         contacts_text(c) + (c.lost > 0 ? fmt::format("; {} lost", c.lost) : "")});
   }
   table.print();
   double outside_s = 0;
   for (const Comparison& c : flown.controllers) outside_s = std::max(outside_s, c.clamped_s);
-  if (outside_s > 0) fmt::print("Up to {:.2f} s of a run were outside the map, where its border's values hold.\n", outside_s);
+  if (outside_s > 0)
+    fmt::print("Up to {:.2f} s of a run were outside the map, where its border's values hold.\n", outside_s);
   fmt::print("\n");
 }
 
-std::string flown_json(const std::vector<FlownScenario>& flown, const std::string& map, std::uint64_t seed, bool programme) {
+std::string flown_json(const std::vector<FlownScenario>& flown, const std::string& map, std::uint64_t seed,
+                       bool programme) {
   if (!programme) return scenario_json(flown[0], map, seed).dump(1) + "\n";
-  nlohmann::ordered_json json{{"format", "tunnelrig-fly-programme/1"}, {"scenarios", nlohmann::ordered_json::array()}};
+  nlohmann::ordered_json json{{"format", "tunnelrig-fly-programme/1"},
+                              {"scenarios", nlohmann::ordered_json::array()}};
   for (const FlownScenario& one : flown) json["scenarios"].push_back(scenario_json(one, map, seed));
   return json.dump(1) + "\n";
 }
@@ -132,11 +141,14 @@ void print_beside_thesis(const std::vector<FlownScenario>& flown) {
     }
   }
   table.print();
-  fmt::print("Circles are judged after the first turn, contacts always. docs/flight.md says where and why we differ.\n");
+  fmt::print(
+      "Circles are judged after the first turn, contacts always. docs/flight.md says where and why we "
+      "differ.\n");
 }
 
-std::vector<std::filesystem::path> write_flown(const std::filesystem::path& folder, const FlownScenario& flown,
-                                               const FlightTask& task, std::string& warning) {
+std::vector<std::filesystem::path> write_flown(const std::filesystem::path& folder,
+                                               const FlownScenario& flown, const FlightTask& task,
+                                               std::string& warning) {
   std::filesystem::create_directories(folder);
   std::vector<std::filesystem::path> files;
   const auto write = [&](const std::string& name, const std::string& text) {

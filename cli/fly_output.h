@@ -19,14 +19,16 @@ struct FlownScenario {
 void print_flown(const FlownScenario& flown);
 
 /// The object that docs/flight.md describes.
-std::string flown_json(const std::vector<FlownScenario>& flown, const std::string& map, std::uint64_t seed, bool programme);
+std::string flown_json(const std::vector<FlownScenario>& flown, const std::string& map, std::uint64_t seed,
+                       bool programme);
 
 /// The thesis's results (6.3) beside ours, where it has one.
 void print_beside_thesis(const std::vector<FlownScenario>& flown);
 
-/// Logs, residual tables with schemas, the comparison as CSV, and pictures. Returns what was written; `warning` is set where the
-/// pictures could not be made.
-std::vector<std::filesystem::path> write_flown(const std::filesystem::path& folder, const FlownScenario& flown,
-                                               const FlightTask& task, std::string& warning);
+/// Logs, residual tables with schemas, the comparison as CSV, and pictures. Returns what was written;
+/// `warning` is set where the pictures could not be made.
+std::vector<std::filesystem::path> write_flown(const std::filesystem::path& folder,
+                                               const FlownScenario& flown, const FlightTask& task,
+                                               std::string& warning);
 
 }  // namespace tunnelrig::cli

@@ -21,16 +21,19 @@ std::string style(std::size_t i) { return fmt::format("lc rgb '{}' lw 1.8", kCol
 /// Inline data blocks: walls, reference, and one path per controller.
 std::string data_blocks(const FlownScenario& flown, const FlightTask& task, std::size_t shown) {
   std::string text = "$walls << EOD\n";
-  for (const auto& edge : task.space->walls.edges()) text += fmt::format("{:.4f} {:.4f}\n", edge.from[0], edge.from[1]);
+  for (const auto& edge : task.space->walls.edges())
+    text += fmt::format("{:.4f} {:.4f}\n", edge.from[0], edge.from[1]);
   const auto& first = task.space->walls.edges()[0].from;
   text += fmt::format("{:.4f} {:.4f}\nEOD\n$reference << EOD\n", first[0], first[1]);
-  for (const LogRow& row : flown.logs[0].rows) text += fmt::format("{:.4f} {:.4f}\n", row.reference_m[0], row.reference_m[1]);
+  for (const LogRow& row : flown.logs[0].rows)
+    text += fmt::format("{:.4f} {:.4f}\n", row.reference_m[0], row.reference_m[1]);
   text += "EOD\n";
   for (std::size_t i = 0; i < shown; ++i) {
     text += fmt::format("$path{} << EOD\n", i);
     for (const LogRow& row : flown.logs[i].rows)
-      text += fmt::format("{:.3f} {:.4f} {:.4f} {:.2f} {:.2f}\n", row.time_s, row.position_m[0], row.position_m[1],
-                          1e3 * (row.reference_m[0] - row.position_m[0]), 1e3 * (row.reference_m[1] - row.position_m[1]));
+      text += fmt::format("{:.3f} {:.4f} {:.4f} {:.2f} {:.2f}\n", row.time_s, row.position_m[0],
+                          row.position_m[1], 1e3 * (row.reference_m[0] - row.position_m[0]),
+                          1e3 * (row.reference_m[1] - row.position_m[1]));
     text += fmt::format("EOD\n$touch{} << EOD\n", i);
     for (const ContactEvent& contact : flown.controllers[i].runs[0].touched)
       text += fmt::format("{:.4f} {:.4f}\n", contact.touched_y_m, contact.touched_z_m);
@@ -48,21 +51,25 @@ std::string path_plot(const FlownScenario& flown, const FlightTask& task, std::s
   const Plane start = {flown.logs[0].rows[0].position_m[0], flown.logs[0].rows[0].position_m[1]};
   std::string outline;
   for (std::size_t i = 0; i < shown; ++i) {
-    text += fmt::format(", $path{} using 2:3 with lines {} title '{}'", i, style(i), flown.controllers[i].controller);
+    text += fmt::format(", $path{} using 2:3 with lines {} title '{}'", i, style(i),
+                        flown.controllers[i].controller);
     if (!flown.controllers[i].runs[0].touched.empty())
       text += fmt::format(", $touch{} with points pt 2 ps 1.8 {} title '{}: contact'", i, style(i),
                           flown.controllers[i].controller);
   }
   const double w = 0.5 * task.believed.width_m, h = 0.5 * task.believed.height_m;
-  return fmt::format("set object 1 rectangle from {:.4f},{:.4f} to {:.4f},{:.4f} fs empty border rgb '#999999'\n",
-                     start[0] - w, start[1] - h, start[0] + w, start[1] + h) +
+  return fmt::format(
+             "set object 1 rectangle from {:.4f},{:.4f} to {:.4f},{:.4f} fs empty border rgb '#999999'\n",
+             start[0] - w, start[1] - h, start[0] + w, start[1] + h) +
          text + "\nunset object 1\n";
 }
 
 std::string error_plot(const FlownScenario& flown, std::size_t shown, const char* axis, int column) {
   std::string text = fmt::format(
-      "set size noratio\nset autoscale xfix\nset offsets 0, 0, graph 0.05, graph 0.05\nset key outside right top\n"
-      "set xlabel 'time [s]'\nset ylabel 'error in {} (reference − position) [mm]'\nplot 0 lc rgb '#999999' notitle",
+      "set size noratio\nset autoscale xfix\nset offsets 0, 0, graph 0.05, graph 0.05\nset key outside right "
+      "top\n"
+      "set xlabel 'time [s]'\nset ylabel 'error in {} (reference − position) [mm]'\nplot 0 lc rgb '#999999' "
+      "notitle",
       axis);
   for (std::size_t i = 0; i < shown; ++i)
     text += fmt::format(", $path{} using 1:{} with lines {} title '{}'", i, column, style(i),
@@ -79,14 +86,16 @@ std::vector<std::filesystem::path> draw_flown(const std::filesystem::path& folde
   std::filesystem::create_directories(scratch);
   std::string script = data_blocks(flown, task, shown);
   std::vector<std::filesystem::path> files;
-  const auto title = fmt::format("set title '{}, {} tunnel, first run (simulated){}' noenhanced\n", flown.scenario,
-                                 flown.tunnel, shown < flown.logs.size() ? fmt::format("; the first {} controllers", shown) : "");
+  const auto title = fmt::format(
+      "set title '{}, {} tunnel, first run (simulated){}' noenhanced\n", flown.scenario, flown.tunnel,
+      shown < flown.logs.size() ? fmt::format("; the first {} controllers", shown) : "");
   const auto add = [&](const char* name, const std::string& plot, int width, int height) {
     for (const char* format : {"svg", "png"}) {
       const bool png = std::string_view(format) == "png";
-      script += fmt::format("set terminal {} size {},{}{} font 'DejaVu Sans,{}'\nset output '{}'\n{}{}unset output\n",
-                            png ? "pngcairo" : "svg", width, height, png ? "" : " background '#ffffff'", png ? 12 : 13,
-                            fmt::format("{}.{}", name, format), title, plot);
+      script += fmt::format(
+          "set terminal {} size {},{}{} font 'DejaVu Sans,{}'\nset output '{}'\n{}{}unset output\n",
+          png ? "pngcairo" : "svg", width, height, png ? "" : " background '#ffffff'", png ? 12 : 13,
+          fmt::format("{}.{}", name, format), title, plot);
       files.push_back(folder / fmt::format("{}.{}", name, format));
     }
   };

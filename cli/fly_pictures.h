@@ -5,8 +5,8 @@
 
 namespace tunnelrig::cli {
 
-/// path.svg/.png (the path in the cross-section, contacts marked), error-y and error-z over time. `warning` is set and nothing
-/// returned where gnuplot does not run.
+/// path.svg/.png (the path in the cross-section, contacts marked), error-y and error-z over time. `warning`
+/// is set and nothing returned where gnuplot does not run.
 std::vector<std::filesystem::path> draw_flown(const std::filesystem::path& folder, const FlownScenario& flown,
                                               const FlightTask& task, std::string& warning);
 

@@ -43,9 +43,9 @@ struct FlightLog {
 /// CSV with a header; lengths in metres, angles in radians.
 std::string format_log(const FlightLog& log);
 
-/// The residual table as `tunnelrig import --format table` reads it, in newtons and newton metres of the believed vehicle, and its
-/// schema (docs/tables.md) for one response: "lift" (measured lift beside the predicted one), or the residual "vertical",
-/// "lateral", "roll" or "pitch". Throws InputError for another.
+/// The residual table as `tunnelrig import --format table` reads it, in newtons and newton metres of the
+/// believed vehicle, and its schema (docs/tables.md) for one response: "lift" (measured lift beside the
+/// predicted one), or the residual "vertical", "lateral", "roll" or "pitch". Throws InputError for another.
 std::string format_residuals(const FlightLog& log, const Airframe& believed);
 std::string residual_schema(std::string_view response);
 

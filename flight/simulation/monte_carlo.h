@@ -1,5 +1,5 @@
-// Many flights of one controller, each with its own noise, vehicle and map errors; the same for a seed whatever the number of
-// workers.
+// Many flights of one controller, each with its own noise, vehicle and map errors; the same for a seed
+// whatever the number of workers.
 #pragma once
 
 #include "flight/scenarios/scenario.h"
@@ -27,7 +27,8 @@ struct HiddenTruth {
 
 /// Standard deviations between runs.
 struct Spread {
-  double mass = 0.01, rotor_thrust = 0.01;  // relative; every rotor its own, after the thesis's sorting of propellers
+  double mass = 0.01,
+         rotor_thrust = 0.01;  // relative; every rotor its own, after the thesis's sorting of propellers
   double roll_error_rad = 0.0035, accelerometer_bias_m_s2 = 0.02;
   double map_errors = 1;  // of the map's standard uncertainty, one draw for each layer
 
@@ -43,7 +44,8 @@ struct FlightTask {
   HiddenTruth hidden;
   Spread spread;
   AirSettings air;
-  std::optional<LocalisationSettings> localisation = LocalisationSettings{};  // nothing: the position is given
+  std::optional<LocalisationSettings> localisation =
+      LocalisationSettings{};  // nothing: the position is given
   int runs = 20;
   int workers = 0;  // 0: as many as there are cores
   std::uint64_t seed = 1;

@@ -1,6 +1,5 @@
-#include "flight/simulation/flight_log.h"
-
 #include "datasets/error.h"
+#include "flight/simulation/flight_log.h"
 
 #include <array>
 #include <iterator>
@@ -42,14 +41,16 @@ constexpr std::array<Covariate, 11> kCovariates = {{{"time_s", "s", ""},
 
 std::string format_residuals(const FlightLog& log, const Airframe& believed) {
   std::string text =
-      "time_s,block,y_norm,z_norm,lift_N,vertical_N,lateral_N,roll_N_m,pitch_N_m,predicted_N,map_N,map_roll_N_m,"
+      "time_s,block,y_norm,z_norm,lift_N,vertical_N,lateral_N,roll_N_m,pitch_N_m,predicted_N,map_N,map_roll_"
+      "N_m,"
       "airspeed_m_s,rotor1_N,rotor2_N,rotor3_N,rotor4_N\n";
   const double mass = believed.mass_kg;
   const auto& inertia = believed.inertia_kg_m2;
   for (const ResidualRow& r : log.residuals) {
     const double predicted_N = mass * (r.thrust_m_s2 + r.map_thrust_m_s2);
     fmt::format_to(std::back_inserter(text),
-                   "{:.4f},{},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{:.6f},{:.6f},{:.5f},{:.5f},{:.6f},{:.4f},{:.5f},{:.5f},"
+                   "{:.4f},{},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{:.6f},{:.6f},{:.5f},{:.5f},{:.6f},{:.4f},{:"
+                   ".5f},{:.5f},"
                    "{:.5f},{:.5f}\n",
                    r.time_s, r.block, r.y_norm, r.z_norm, predicted_N + mass * r.residual_m_s2[1],
                    mass * r.residual_m_s2[1], mass * r.residual_m_s2[0], inertia[0] * r.roll_residual_rad_s2,
@@ -61,16 +62,18 @@ std::string format_residuals(const FlightLog& log, const Airframe& believed) {
 }
 
 std::string residual_schema(std::string_view response) {
-  const auto* const found =
-      std::find_if(kResponses.begin(), kResponses.end(), [&](const Response& r) { return r.name == response; });
+  const auto* const found = std::find_if(kResponses.begin(), kResponses.end(),
+                                         [&](const Response& r) { return r.name == response; });
   if (found == kResponses.end())
-    throw InputError(fmt::format("no residual {}; there are lift, vertical, lateral, roll and pitch", response));
+    throw InputError(
+        fmt::format("no residual {}; there are lift, vertical, lateral, roll and pitch", response));
   std::string text = fmt::format(
       "format = \"tunnelrig-table/1\"\nname = \"flight residual, {}\"\nblocks = \"block\"\n\n"
       "[response]\ncolumn = \"{}\"\nunit = \"{}\"\n",
       found->name, found->column, found->unit);
   for (const Covariate& covariate : kCovariates) {
-    text += fmt::format("\n[[covariates]]\ncolumn = \"{}\"\nunit = \"{}\"\n", covariate.column, covariate.unit);
+    text +=
+        fmt::format("\n[[covariates]]\ncolumn = \"{}\"\nunit = \"{}\"\n", covariate.column, covariate.unit);
     if (*covariate.meaning != '\0') text += fmt::format("meaning = \"{}\"\n", covariate.meaning);
   }
   return text;

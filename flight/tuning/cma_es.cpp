@@ -11,8 +11,8 @@
 
 namespace tunnelrig {
 
-SearchResult minimise(const std::function<double(const Eigen::VectorXd&)>& cost, const Eigen::VectorXd& start, double spread,
-                      int budget, std::uint64_t seed) {
+SearchResult minimise(const std::function<double(const Eigen::VectorXd&)>& cost, const Eigen::VectorXd& start,
+                      double spread, int budget, std::uint64_t seed) {
   const Eigen::Index n = start.size();
   const auto dim = static_cast<double>(n);
   const int population = 4 + static_cast<int>(3 * std::log(dim)), parents = population / 2;

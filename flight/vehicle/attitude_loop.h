@@ -22,8 +22,8 @@ inline double square_root_law(double error, double p, double limit) {
 
 /// Share of a step that a first-order low pass takes over.
 inline double low_pass_share(double cut_off_Hz, double step_s) {
-  const double t = 1 / (6.283185307179586 * cut_off_Hz);
-  return step_s / (step_s + t);
+  const double x = 6.283185307179586 * cut_off_Hz * step_s;
+  return x / (1 + x);
 }
 
 struct AxisGains {

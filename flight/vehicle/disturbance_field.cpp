@@ -128,6 +128,8 @@ DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, doub
   z_ = layers[0].z;
   y_at_ = buckets(y_, 0);
   z_at_ = buckets(z_, -1);
+  for (std::size_t i = 1; i < y_.size(); ++i) per_width_.push_back(1 / (y_[i] - y_[i - 1]));
+  for (std::size_t i = 1; i < z_.size(); ++i) per_height_.push_back(1 / (z_[i] - z_[i - 1]));
   nodes_.resize(y_.size() * z_.size());
   for (std::size_t k = 0; k < layers.size(); ++k) {
     const auto f_y = layers[k].along_y(layers[k].value), f_z = layers[k].along_z(layers[k].value);
@@ -150,7 +152,7 @@ Disturbance DisturbanceField::at(double y_norm, double z_norm) const {
   const double y = std::min(std::abs(y_norm), 1.0), z = std::clamp(z_norm, -1.0, 1.0);
   const std::size_t c = cell_of(y, 0, y_, y_at_), r = cell_of(z, -1, z_, z_at_);
   const double width = y_[c + 1] - y_[c], height = z_[r + 1] - z_[r];
-  const Basis by((y - y_[c]) / width, width), bz((z - z_[r]) / height, height);
+  const Basis by((y - y_[c]) * per_width_[c], width), bz((z - z_[r]) * per_height_[r], height);
   const Node* low = &nodes_[r * y_.size() + c];
   const Node* high = low + y_.size();
   double value[2];

@@ -43,9 +43,10 @@ class DisturbanceField {
     double f[2]{}, f_y[2]{}, f_z[2]{}, f_yz[2]{};  // ΔC_T and U, fractions
   };
 
-  std::vector<double> y_, z_;             // y_ from 0 to 1
-  std::vector<std::size_t> y_at_, z_at_;  // buckets: where to begin the search for a cell
-  std::vector<Node> nodes_;               // row by row, rows follow z
+  std::vector<double> y_, z_;                   // y_ from 0 to 1
+  std::vector<double> per_width_, per_height_;  // of every cell
+  std::vector<std::size_t> y_at_, z_at_;        // buckets: where to begin the search for a cell
+  std::vector<Node> nodes_;                     // row by row, rows follow z
 };
 
 /// The field that datasets/published_field.h invents within the thesis's claims, for the rig's geometry, on
