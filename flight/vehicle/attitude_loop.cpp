@@ -60,15 +60,14 @@ PerRotor AttitudeLoop::step(const AttitudeTarget& target, const AttitudeSense& s
   const double deflection_yaw = moment[2] / full_moment_N_m_ * gains_.share_for_attitude * largest_N_;
   const double per_yaw = std::clamp(deflection_yaw, -yaw_limit, yaw_limit);
 
-  const double spread = std::abs(per_roll) + std::abs(per_pitch) + std::abs(per_yaw);
-  const double mean = 0.25 * mass_kg_ * target.thrust_m_s2;
-  const double highest = std::max(largest_N_ - spread, 0.5 * (largest_N_ + smallest_N_));
-  const double lowest = std::min(smallest_N_ + spread, 0.5 * (largest_N_ + smallest_N_));
-  const double common = std::clamp(mean, lowest, highest);
   PerRotor thrust;
-  for (std::size_t i = 0; i < kRotors; ++i) {
-    thrust[i] = common + kRotorY[i] * per_roll - kRotorX[i] * per_pitch + kRotorSpin[i] * per_yaw;
-  }
+  for (std::size_t i = 0; i < kRotors; ++i)
+    thrust[i] = kRotorY[i] * per_roll - kRotorX[i] * per_pitch + kRotorSpin[i] * per_yaw;
+  const auto [least, most] = std::minmax_element(thrust.begin(), thrust.end());
+  const double highest = largest_N_ - *most, lowest = smallest_N_ - *least;
+  const double mean = 0.25 * mass_kg_ * target.thrust_m_s2;
+  const double common = lowest < highest ? std::clamp(mean, lowest, highest) : 0.5 * (lowest + highest);
+  for (double& t : thrust) t += common;
   return thrust;
 }
 

@@ -112,11 +112,13 @@ double resolve_touch(RigidState& state, const Airframe& frame, const Touch& touc
   };
   const double blow = impulse_along(n, (1 + bounce.restitution) * closing);
   const Point tangent = {-n[1], n[0]};
-  const double sliding = vy * tangent[0] + vz * tangent[1];
-  const double most = bounce.friction * blow;
-  const double rub = std::clamp(-impulse_along(tangent, sliding), -most, most);
   apply(n, blow);
-  apply(tangent, rub);
+  // Of the sliding that the blow leaves: rubbing against what was there before it may add energy through the
+  // rotation.
+  const double sliding = (state.velocity_m_s[1] - state.rate_rad_s[0] * rz) * tangent[0] +
+                         (state.velocity_m_s[2] + state.rate_rad_s[0] * ry) * tangent[1];
+  const double most = bounce.friction * blow;
+  apply(tangent, std::clamp(-impulse_along(tangent, sliding), -most, most));
   return closing;
 }
 
