@@ -10,7 +10,6 @@ AttitudeLoop::AttitudeLoop(const Airframe& believed, const AttitudeGains& gains,
                        believed.largest_thrust_N),
       largest_N_(believed.largest_thrust_N),
       smallest_N_(believed.smallest_thrust_N),
-      torque_over_thrust_m_(believed.torque_over_thrust_m),
       offset_m_(believed.rotor_offset_m()) {
   const std::array<AxisGains, 3> all = {gains.roll, gains.pitch, gains.yaw};
   for (std::size_t i = 0; i < 3; ++i) {

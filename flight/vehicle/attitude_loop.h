@@ -85,7 +85,7 @@ class AttitudeLoop {
   };
 
   AttitudeGains gains_;
-  double step_s_, mass_kg_, full_moment_N_m_, largest_N_, smallest_N_, torque_over_thrust_m_, offset_m_;
+  double step_s_, mass_kg_, full_moment_N_m_, largest_N_, smallest_N_, offset_m_;
   std::array<Axis, 3> axes_;
 };
 
