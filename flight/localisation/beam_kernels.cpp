@@ -109,7 +109,8 @@ struct Body {
   }
 
   template <int unknowns>
-  TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, FitSums& sums) {
+  TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, float most_slope,
+                          FitSums& sums) {
     Floats normal[unknowns * (unknowns + 1) / 2][kParts] = {};
     Floats gradient[unknowns][kParts] = {};
     Floats square[kParts] = {};
@@ -124,7 +125,8 @@ struct Body {
       const Floats inverse = *reinterpret_cast<const Floats*>(beams.inverse + i);
       const Floats wall_y = *reinterpret_cast<const Floats*>(beams.wall_y + i);
       const Floats wall_z = *reinterpret_cast<const Floats*>(beams.wall_z + i);
-      const Ints met = (range > 0.0F) & (inverse > 0.0F);
+      const Ints met = (range > 0.0F) & (inverse > 0.0F) &
+                       (wall_y * wall_y + wall_z * wall_z < most_slope * most_slope * inverse * inverse);
       const Floats should = one / (met ? inverse : one);
       const Floats error = range - should;
       const Ints in = met & (error < gate) & (error > -gate);
@@ -133,6 +135,7 @@ struct Body {
       inliers[part] += in ? one : zero;
       beyond[part] += through ? one : zero;
       const Floats e = in ? error : zero;
+      *reinterpret_cast<Floats*>(beams.error + i) = e;
       Floats j[unknowns];
       // Moving by d towards a wall shortens the range by d·wall·range.
       const Floats scale = in ? -should : zero;
@@ -163,10 +166,11 @@ struct Body {
     }
   }
 
-  TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, int unknowns, FitSums& sums) {
-    if (unknowns == 2) return fit<2>(beams, p, gate, sums);
-    if (unknowns == 3) return fit<3>(beams, p, gate, sums);
-    fit<4>(beams, p, gate, sums);
+  TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, float most_slope, int unknowns,
+                          FitSums& sums) {
+    if (unknowns == 2) return fit<2>(beams, p, gate, most_slope, sums);
+    if (unknowns == 3) return fit<3>(beams, p, gate, most_slope, sums);
+    fit<4>(beams, p, gate, most_slope, sums);
   }
 
   TUNNELRIG_BODY void correlate(const std::uint16_t* histogram, const std::int32_t* start,
@@ -197,6 +201,17 @@ struct Body {
     }
   }
 
+  TUNNELRIG_BODY float neighbours(const Beams& beams) {
+    Floats sum[kParts] = {};
+    std::size_t i = 0;
+    for (std::size_t part = 0; i + kSums < beams.padded; i += kWidth, part = (part + 1) % kParts)
+      sum[part] += *reinterpret_cast<const Floats*>(beams.error + i) *
+                   *reinterpret_cast<const Loose*>(beams.error + i + 1);
+    float result = total(sum);
+    for (; i + 1 < beams.padded; ++i) result += beams.error[i] * beams.error[i + 1];
+    return result;
+  }
+
   TUNNELRIG_BODY float maximum(const float* in, std::size_t size) {
     Floats most = {};
     std::size_t i = 0;
@@ -225,9 +240,9 @@ struct Body {
     target static void see(const Beams& beams, std::size_t first, std::size_t last, float y, float z) {     \
       Body<width>::see(beams, first, last, y, z);                                                           \
     }                                                                                                       \
-    target static void fit(const Beams& beams, const Projection& p, float gate, int unknowns,               \
-                           FitSums& sums) {                                                                 \
-      Body<width>::fit(beams, p, gate, unknowns, sums);                                                     \
+    target static void fit(const Beams& beams, const Projection& p, float gate, float most_slope,           \
+                           int unknowns, FitSums& sums) {                                                   \
+      Body<width>::fit(beams, p, gate, most_slope, unknowns, sums);                                         \
     }                                                                                                       \
     target static void correlate(const std::uint16_t* histogram, const std::int32_t* start,                 \
                                  const float* weight, std::size_t cell_count, float* out,                   \
@@ -238,11 +253,13 @@ struct Body {
                               std::size_t size) {                                                           \
       Body<width>::smooth(in, tap, taps, out, size);                                                        \
     }                                                                                                       \
+    target static float neighbours(const Beams& beams) { return Body<width>::neighbours(beams); }           \
     target static float maximum(const float* in, std::size_t size) {                                        \
       return Body<width>::maximum(in, size);                                                                \
     }                                                                                                       \
     static const BeamKernels& kernels(const char* name) {                                                   \
-      static const BeamKernels all{name, load, project, cells, see, fit, correlate, smooth, maximum};       \
+      static const BeamKernels all{name, load,      project, cells,      see,                               \
+                                   fit,  correlate, smooth,  neighbours, maximum};                          \
       return all;                                                                                           \
     }                                                                                                       \
   };

@@ -41,6 +41,7 @@ struct Beams {
   /// none.
   float* wall_y = nullptr;
   float* wall_z = nullptr;
+  float* error = nullptr;    // of the last fit: measured − expected range within the gate, 0 elsewhere
   float* inverse = nullptr;  // 1 / expected range; 0 where no wall is met
 };
 
@@ -71,12 +72,15 @@ struct BeamKernels {
                 std::int32_t* cell);
   /// Beams first … last − 1 may meet a wall; the nearest of all walls stays.
   void (*see)(const Beams& beams, std::size_t first, std::size_t last, float wall_y, float wall_z);
-  void (*fit)(const Beams& beams, const Projection& projection, float gate, int unknowns, FitSums& sums);
+  /// Beams that meet their wall at more than `most_slope` = 1 / cos(incidence) do not count.
+  void (*fit)(const Beams& beams, const Projection& projection, float gate, float most_slope, int unknowns,
+              FitSums& sums);
   /// out[i] = Σ weight[k] histogram[start[k] − i]: the correlation (6.9) with a reference of few cells.
   void (*correlate)(const std::uint16_t* histogram, const std::int32_t* start, const float* weight,
                     std::size_t cells, float* out, std::size_t size);
   /// out[i] = Σ tap[j] in[i + j]
   void (*smooth)(const float* in, const float* tap, std::size_t taps, float* out, std::size_t size);
+  float (*neighbours)(const Beams& beams);              // Σ error[i] error[i + 1]
   float (*maximum)(const float* in, std::size_t size);  // of values that are not negative; 0 of none
 };
 

@@ -53,7 +53,7 @@ void HoughColumn::keep_highest_cells(std::span<const SectionPoint> reference) {
   for (const std::int32_t cell : order) {
     if (start_.size() == kMost_cells || value(cell) < kLeast_share * most || value(cell) == 0) break;
     start_.push_back(cell);
-    weight_.push_back(value(cell) / most);
+    weight_.push_back(value(cell) / static_cast<float>(reference.size()));
   }
 }
 

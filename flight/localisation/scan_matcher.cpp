@@ -41,6 +41,7 @@ void check(const MatcherSettings& s) {
   check("most_range_m", s.most_range_m, s.least_range_m, 1e4);
   check("first_gate_m", s.first_gate_m, 1e-3, 10);
   check("gate_sigma", s.gate_sigma, 1, 100);
+  check("most_slope", s.most_slope, 1, 1e6);
   check("least_sigma_m", s.least_sigma_m, 1e-6, 1);
   check("prior_gate_m", s.prior_gate_m, 0, 1e4);
   check("vantage_spread", s.vantage_spread, 0, 0.95);
@@ -49,6 +50,8 @@ void check(const MatcherSettings& s) {
   check("most_beyond", s.most_beyond, 0, 1);
   check("most_sigma_m", s.most_sigma_m, 1e-6, 1e3);
   check("most_residual_m", s.most_residual_m, 1e-6, 1e3);
+  check("most_correlation", s.most_correlation, -1, 1);
+  check("misfit_m", s.misfit_m, 0, 1e3);
   check("ambiguity", s.ambiguity, 0, 1);
 }
 
@@ -99,6 +102,7 @@ struct Fit {
   double inliers = 0;  // beams
   double beyond = 0;
   double residual_m = 0;
+  double correlation = 0;  // of neighbouring beams' residuals
   bool solved = false;
 };
 
@@ -139,7 +143,7 @@ struct ScanMatcher::Work {
   Search search;
   VisibleWalls walls;
   const BeamKernels& kernels = beam_kernels();
-  BeamArray arrays[10];
+  BeamArray arrays[11];
   Beams beams;
   Eigen::Matrix2d attitude = Eigen::Matrix2d::Identity();  // the projection that the IMU gives
   int returned = 0;                                        // beams with a return
@@ -150,8 +154,9 @@ struct ScanMatcher::Work {
         section(the_section),
         search(search_for(section, settings)),
         walls(section, settings.layout) {
-    float** const into[] = {&beams.cosine, &beams.sine, &beams.range,  &beams.along_y, &beams.along_z,
-                            &beams.y,      &beams.z,    &beams.wall_y, &beams.wall_z,  &beams.inverse};
+    float** const into[] = {&beams.cosine,  &beams.sine,    &beams.range, &beams.along_y,
+                            &beams.along_z, &beams.y,       &beams.z,     &beams.wall_y,
+                            &beams.wall_z,  &beams.inverse, &beams.error};
     for (std::size_t i = 0; i < std::size(arrays); ++i) {
       arrays[i].resize(settings.layout.beams);
       *into[i] = arrays[i].data();
@@ -214,7 +219,7 @@ struct ScanMatcher::Work {
   /// not far before its wall) lowers that, and would raise a gate made from the RMS until it is let in.
   static bool heavy_tailed(const FitSums& sums) {
     constexpr float kGaussian = 0.797885F;
-    constexpr float kLeast_share = 0.9F;
+    constexpr float kLeast_share = 0.95F;
     return sums.absolute < kLeast_share * kGaussian * std::sqrt(sums.square * sums.inliers);
   }
 
@@ -241,10 +246,12 @@ struct ScanMatcher::Work {
     walls.look(kernels, beams, now, fit.pose.position);
     FitSums sums;
     const int size = unknowns();
-    kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), size, sums);
+    kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), static_cast<float>(settings.most_slope),
+                size, sums);
     if (heavy_tailed(sums)) {
       gate_m = tight_gate_m(gate_m);
-      kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), size, sums);
+      kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), static_cast<float>(settings.most_slope),
+                  size, sums);
     }
     fit.inliers = sums.inliers;
     fit.beyond = sums.beyond;
@@ -275,6 +282,7 @@ struct ScanMatcher::Work {
       fit.covariance.topLeftCorner(size, size) = variance * inverse.topLeftCorner(size, size);
       change = inverse * gradient;
     }
+    fit.correlation = kernels.neighbours(beams) / std::max(sums.square, 1e-12F);
     fit.solved = true;
     fit.pose.position += change.head<2>();
     if (size >= 3) fit.pose.rotation_rad += change(2);
@@ -304,6 +312,8 @@ struct ScanMatcher::Work {
       return Rejection::poor_fit;
     if (!fit.solved) return Rejection::unobservable;
     if (fit.residual_m > settings.most_residual_m) return Rejection::noisy;
+    if (fit.residual_m > settings.misfit_m && fit.correlation > settings.most_correlation)
+      return Rejection::poor_fit;
     const Eigen::Matrix2d c = fit.covariance.topLeftCorner<2, 2>();
     const double middle = 0.5 * (c(0, 0) + c(1, 1));
     const double largest = middle + std::hypot(0.5 * (c(0, 0) - c(1, 1)), c(0, 1));
@@ -311,16 +321,29 @@ struct ScanMatcher::Work {
     return Rejection::none;
   }
 
+  /// Of y, that a match may begin with: yaws of 0, 18°, 30° and 42° more than the IMU's
+  std::vector<double> stretches() const {
+    if (settings.unknowns != Unknowns::rotation_and_heading) return {0};
+    return {0, -0.05, -0.14, -0.30};
+  }
+
   /// All maxima of the Hough domain, where the highest is not plainly the right one.
   Rejection choose(const SearchBox& where, double rotation_rad, Fit& fit) {
-    project({{0, 0}, rotation_rad, 0});
-    const std::vector<Start> starts =
-        std::visit([&](const auto& form) { return form.candidates(kernels, where); }, search);
     std::vector<Fit> good;
-    for (const Start& start : starts) {
-      project({{0, 0}, rotation_rad, 0});
-      const Fit other = refine({start.position, rotation_rad, 0});
-      if (judge(other) == Rejection::none) good.push_back(other);
+    for (const double stretch : stretches()) {
+      const Pose view{{0, 0}, rotation_rad, stretch};
+      project(view);
+      const std::vector<Start> starts = std::visit(
+          [&](auto& form) {
+            form.take(kernels, beams);
+            return form.candidates(kernels, where);
+          },
+          search);
+      for (const Start& start : starts) {
+        project(view);
+        const Fit other = refine({start.position, rotation_rad, stretch});
+        if (judge(other) == Rejection::none) good.push_back(other);
+      }
     }
     if (good.empty()) return judge(fit);
     fit = *std::max_element(good.begin(), good.end(),

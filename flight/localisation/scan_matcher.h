@@ -38,17 +38,22 @@ struct MatcherSettings {
   double most_range_m = 30;
   double first_gate_m = 0.20;    // beams further from the wall they should meet do not count at first,
   double gate_sigma = 4;         // then beyond so many standard deviations of those that did
+  double most_slope = 12;        // 1 / cos(incidence): beams that graze a wall more say little of where it is
   double least_sigma_m = 0.003;  // of a range, whatever the scan's own residuals say
   double prior_gate_m = 0.25;    // arg max within this of a prior, where one is given
   double vantage_spread = 0.6;   // part of the section that the reference is seen from; 0: its origin alone
 
   // What is rejected.
   std::size_t least_beams = 60;
-  double least_inliers = 0.6;    // of the beams with a return
-  double most_beyond = 0.15;     // of them: a beam cannot see through a wall, if it is the right tunnel
-  double most_sigma_m = 0.05;    // of the position along its worst axis
-  double most_residual_m = 0.1;  // RMS of the beams that fit
-  double ambiguity = 0.9;        // another place that fits with this share of the inliers
+  double least_inliers = 0.6;     // of the beams with a return
+  double most_beyond = 0.15;      // of them: a beam cannot see through a wall, if it is the right tunnel
+  double most_sigma_m = 0.05;     // of the position along its worst axis
+  double most_residual_m = 0.08;  // RMS of the beams that fit
+  /// Noise differs from beam to beam, while a wrong shape is wrong over many: correlation of neighbours'
+  /// residuals, looked at where their RMS is more than misfit_m.
+  double most_correlation = 0.5;
+  double misfit_m = 0.015;
+  double ambiguity = 0.9;  // another place that fits with this share of the inliers
 };
 
 enum class Rejection { none, few_beams, poor_fit, noisy, unobservable, ambiguous, outside };

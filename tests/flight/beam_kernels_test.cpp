@@ -15,13 +15,14 @@ namespace tunnelrig {
 namespace {
 
 struct Arrays {
-  BeamArray arrays[10];
+  BeamArray arrays[11];
   Beams beams;
 
   explicit Arrays(std::size_t count) {
-    float** const into[] = {&beams.cosine, &beams.sine, &beams.range,  &beams.along_y, &beams.along_z,
-                            &beams.y,      &beams.z,    &beams.wall_y, &beams.wall_z,  &beams.inverse};
-    for (std::size_t i = 0; i < 10; ++i) {
+    float** const into[] = {&beams.cosine,  &beams.sine,    &beams.range, &beams.along_y,
+                            &beams.along_z, &beams.y,       &beams.z,     &beams.wall_y,
+                            &beams.wall_z,  &beams.inverse, &beams.error};
+    for (std::size_t i = 0; i < 11; ++i) {
       arrays[i].resize(count);
       *into[i] = arrays[i].data();
     }
@@ -58,9 +59,10 @@ std::vector<float> everything(const BeamKernels& k, const std::vector<float>& ra
   k.see(a.beams, range.size() / 2, range.size(), -0.8F, 0.9F);
   for (const int unknowns : {2, 3, 4}) {
     FitSums sums;
-    k.fit(a.beams, p, 0.3F, unknowns, sums);
+    k.fit(a.beams, p, 0.3F, 5, unknowns, sums);
     for (const auto& row : sums.normal) out.insert(out.end(), row, row + 4);
     out.insert(out.end(), sums.gradient, sums.gradient + 4);
+    out.push_back(k.neighbours(a.beams));
     out.insert(out.end(), {sums.square, sums.absolute, sums.inliers, sums.beyond, sums.expected});
   }
   return out;
