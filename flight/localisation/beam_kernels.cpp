@@ -226,7 +226,8 @@ struct Body {
   }
 };
 
-// One struct of functions per instruction set, each with the bodies compiled for it.
+// One struct of functions per instruction set, each with the bodies compiled for it. An attribute cannot
+// stand in parentheses. NOLINTBEGIN(bugprone-macro-parentheses)
 #define TUNNELRIG_FORM(form, width, target)                                                                 \
   struct form {                                                                                             \
     target static int load(const float* range, const Beams& beams, float least, float most) {               \
@@ -263,6 +264,8 @@ struct Body {
       return all;                                                                                           \
     }                                                                                                       \
   };
+
+// NOLINTEND(bugprone-macro-parentheses)
 
 TUNNELRIG_FORM(Portable, Four, )
 #if TUNNELRIG_X86

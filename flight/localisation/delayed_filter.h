@@ -79,7 +79,7 @@ class DelayedFilter {
     Belief<Model::kStates> then = divided.before;
     const double into_step_s = -before_end_s;
     if (into_step_s > kInstant_s) model_.step(then, divided.input, into_step_s, false);
-    const Correction result = update(then, position_m, covariance_m2);
+    Correction result = update(then, position_m, covariance_m2);
     if (!result.accepted) return result;
 
     divided.before = then;

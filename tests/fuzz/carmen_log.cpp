@@ -1,5 +1,6 @@
 // Any text as a CARMEN log; what reads as a scan is made into a section too.
 #include "flight/lidar/carmen_log.h"
+
 #include "flight/localisation/scan_section.h"
 #include "fuzz/input.h"
 

@@ -1,5 +1,6 @@
 // Any text as a tunnel file.
 #include "flight/tunnel/tunnel.h"
+
 #include "fuzz/input.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
