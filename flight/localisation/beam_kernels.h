@@ -41,7 +41,6 @@ struct Beams {
   /// none.
   float* wall_y = nullptr;
   float* wall_z = nullptr;
-  float* error = nullptr;    // of the last fit: measured − expected range within the gate, 0 elsewhere
   float* inverse = nullptr;  // 1 / expected range; 0 where no wall is met
 };
 
@@ -62,6 +61,15 @@ struct FitSums {
   float expected = 0;       // beams with a return and a wall to meet
 };
 
+/// What a fit rests on, along y and z: sums over the beams that count, n the unit normal of a beam's wall, d
+/// the distance of its end from that wall.
+struct Evidence {
+  static constexpr std::size_t kNeighbours = 4;
+  float facing_yy = 0, facing_yz = 0, facing_zz = 0;  // Σ n nᵀ, in beams
+  float square_y = 0, square_z = 0;                   // Σ (n d)²
+  float shared_y = 0, shared_z = 0;  // Σ (n d)(n d)' over pairs of up to kNeighbours beams apart
+};
+
 struct BeamKernels {
   const char* instruction_set;
   /// Copies ranges, those outside of (least, most) as 0. The number that are inside, or −1 where one is NaN.
@@ -75,12 +83,13 @@ struct BeamKernels {
   /// Beams that meet their wall at more than `most_slope` = 1 / cos(incidence) do not count.
   void (*fit)(const Beams& beams, const Projection& projection, float gate, float most_slope, int unknowns,
               FitSums& sums);
+  /// Beams count as in fit. Uses beams.y and beams.z as working memory.
+  void (*weigh)(const Beams& beams, float gate, float most_slope, Evidence& evidence);
   /// out[i] = Σ weight[k] histogram[start[k] − i]: the correlation (6.9) with a reference of few cells.
   void (*correlate)(const std::uint16_t* histogram, const std::int32_t* start, const float* weight,
                     std::size_t cells, float* out, std::size_t size);
   /// out[i] = Σ tap[j] in[i + j]
   void (*smooth)(const float* in, const float* tap, std::size_t taps, float* out, std::size_t size);
-  float (*neighbours)(const Beams& beams);              // Σ error[i] error[i + 1]
   float (*maximum)(const float* in, std::size_t size);  // of values that are not negative; 0 of none
 };
 

@@ -19,6 +19,7 @@ constexpr double kMost_tilt_cosine = 0.2588190451025207;  // 75°
 constexpr int kMost_steps = 8;
 constexpr double kConverged_m = 2e-4;
 constexpr double kSame_place_m = 0.1;
+constexpr double kChance_sigma = 3;  // of what neighbours share by chance
 
 void check(std::string_view name, double value, double lowest, double highest) {
   if (!(value >= lowest && value <= highest))
@@ -50,8 +51,8 @@ void check(const MatcherSettings& s) {
   check("most_beyond", s.most_beyond, 0, 1);
   check("most_sigma_m", s.most_sigma_m, 1e-6, 1e3);
   check("most_residual_m", s.most_residual_m, 1e-6, 1e3);
-  check("most_correlation", s.most_correlation, -1, 1);
-  check("misfit_m", s.misfit_m, 0, 1e3);
+  check("least_facing", s.least_facing, 0, 1);
+  check("most_misfit_m", s.most_misfit_m, 1e-6, 1e3);
   check("ambiguity", s.ambiguity, 0, 1);
 }
 
@@ -89,6 +90,11 @@ Eigen::Matrix2d turn(double angle_rad) {
       .finished();
 }
 
+/// Of a symmetric matrix: the larger eigenvalue.
+double largest(const Eigen::Matrix2d& m) {
+  return 0.5 * m.trace() + std::hypot(0.5 * (m(0, 0) - m(1, 1)), m(0, 1));
+}
+
 /// Where a match stands: position, rotation in the scan plane, and the logarithm of the stretch of y.
 struct Pose {
   SectionPoint position{0, 0};
@@ -102,7 +108,8 @@ struct Fit {
   double inliers = 0;  // beams
   double beyond = 0;
   double residual_m = 0;
-  double correlation = 0;  // of neighbouring beams' residuals
+  double misfit_m = 0;  // along the axis where it is more
+  double facing = 0;    // beams, along the axis where it is fewer
   bool solved = false;
 };
 
@@ -143,7 +150,7 @@ struct ScanMatcher::Work {
   Search search;
   VisibleWalls walls;
   const BeamKernels& kernels = beam_kernels();
-  BeamArray arrays[11];
+  BeamArray arrays[10];
   Beams beams;
   Eigen::Matrix2d attitude = Eigen::Matrix2d::Identity();  // the projection that the IMU gives
   int returned = 0;                                        // beams with a return
@@ -154,9 +161,8 @@ struct ScanMatcher::Work {
         section(the_section),
         search(search_for(section, settings)),
         walls(section, settings.layout) {
-    float** const into[] = {&beams.cosine,  &beams.sine,    &beams.range, &beams.along_y,
-                            &beams.along_z, &beams.y,       &beams.z,     &beams.wall_y,
-                            &beams.wall_z,  &beams.inverse, &beams.error};
+    float** const into[] = {&beams.cosine, &beams.sine, &beams.range,  &beams.along_y, &beams.along_z,
+                            &beams.y,      &beams.z,    &beams.wall_y, &beams.wall_z,  &beams.inverse};
     for (std::size_t i = 0; i < std::size(arrays); ++i) {
       arrays[i].resize(settings.layout.beams);
       *into[i] = arrays[i].data();
@@ -282,7 +288,6 @@ struct ScanMatcher::Work {
       fit.covariance.topLeftCorner(size, size) = variance * inverse.topLeftCorner(size, size);
       change = inverse * gradient;
     }
-    fit.correlation = kernels.neighbours(beams) / std::max(sums.square, 1e-12F);
     fit.solved = true;
     fit.pose.position += change.head<2>();
     if (size >= 3) fit.pose.rotation_rad += change(2);
@@ -303,7 +308,28 @@ struct ScanMatcher::Work {
       gate = std::min(gate, tight);
       if (moved < kConverged_m || (moved < 5 * kConverged_m && same_gate && i > 0)) break;
     }
+    if (fit.solved) weigh(fit, gate);
     return fit;
+  }
+
+  /// What the section is wrong by does not average out over beams as noise does: it is added to the
+  /// covariance.
+  void weigh(Fit& fit, double gate_m) const {
+    Evidence e;
+    kernels.weigh(beams, static_cast<float>(gate_m), static_cast<float>(settings.most_slope), e);
+    constexpr double kPairs = Evidence::kNeighbours;
+    const auto misfit_m2 = [](double shared, double square, double facing) {
+      if (facing < 1) return 0.0;
+      const double by_chance = kChance_sigma * square / std::sqrt(kPairs * facing);
+      return std::max((shared / kPairs - by_chance) / facing, 0.0);
+    };
+    const double misfit = std::max(misfit_m2(e.shared_y, e.square_y, e.facing_yy),
+                                   misfit_m2(e.shared_z, e.square_z, e.facing_zz));
+    fit.misfit_m = std::sqrt(misfit);
+    fit.covariance.topLeftCorner<2, 2>() += misfit * Eigen::Matrix2d::Identity();
+    const Eigen::Matrix2d facing =
+        (Eigen::Matrix2d() << e.facing_yy, e.facing_yz, e.facing_yz, e.facing_zz).finished();
+    fit.facing = facing.trace() - largest(facing);
   }
 
   Rejection judge(const Fit& fit) const {
@@ -312,12 +338,10 @@ struct ScanMatcher::Work {
       return Rejection::poor_fit;
     if (!fit.solved) return Rejection::unobservable;
     if (fit.residual_m > settings.most_residual_m) return Rejection::noisy;
-    if (fit.residual_m > settings.misfit_m && fit.correlation > settings.most_correlation)
-      return Rejection::poor_fit;
-    const Eigen::Matrix2d c = fit.covariance.topLeftCorner<2, 2>();
-    const double middle = 0.5 * (c(0, 0) + c(1, 1));
-    const double largest = middle + std::hypot(0.5 * (c(0, 0) - c(1, 1)), c(0, 1));
-    if (!(largest <= settings.most_sigma_m * settings.most_sigma_m)) return Rejection::unobservable;
+    if (fit.misfit_m > settings.most_misfit_m) return Rejection::poor_fit;
+    if (fit.facing < settings.least_facing * static_cast<double>(beams.count) ||
+        largest(fit.covariance.topLeftCorner<2, 2>()) > settings.most_sigma_m * settings.most_sigma_m)
+      return Rejection::unobservable;
     return Rejection::none;
   }
 

@@ -45,15 +45,20 @@ struct MatcherSettings {
 
   // What is rejected.
   std::size_t least_beams = 60;
-  double least_inliers = 0.6;     // of the beams with a return
-  double most_beyond = 0.15;      // of them: a beam cannot see through a wall, if it is the right tunnel
+  /// Of the beams with a return. Two walls of a wider tunnel, seen from their corner, can take up to
+  /// 0.76 of a scan.
+  double least_inliers = 0.78;
+  double most_beyond = 0.1;  // of them: a beam cannot see through a wall, if it is the right tunnel
+  /// Of all beams: so many must face the direction in which the position is known worst. A few beams beside a
+  /// corner fit wherever that corner is put.
+  double least_facing = 0.08;
   double most_sigma_m = 0.05;     // of the position along its worst axis
   double most_residual_m = 0.08;  // RMS of the beams that fit
-  /// Noise differs from beam to beam, while a wrong shape is wrong over many: correlation of neighbours'
-  /// residuals, looked at where their RMS is more than misfit_m.
-  double most_correlation = 0.5;
-  double misfit_m = 0.015;
-  double ambiguity = 0.9;  // another place that fits with this share of the inliers
+  /// Noise differs from beam to beam, a wrong shape is wrong over many: RMS of what the distances from the
+  /// walls that face one axis share with those of neighbouring beams, where it is more than noise alone may
+  /// show.
+  double most_misfit_m = 0.012;
+  double ambiguity = 0.8;  // another place that fits with this share of the inliers
 };
 
 enum class Rejection { none, few_beams, poor_fit, noisy, unobservable, ambiguous, outside };

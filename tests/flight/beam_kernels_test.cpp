@@ -15,14 +15,13 @@ namespace tunnelrig {
 namespace {
 
 struct Arrays {
-  BeamArray arrays[11];
+  BeamArray arrays[10];
   Beams beams;
 
   explicit Arrays(std::size_t count) {
-    float** const into[] = {&beams.cosine,  &beams.sine,    &beams.range, &beams.along_y,
-                            &beams.along_z, &beams.y,       &beams.z,     &beams.wall_y,
-                            &beams.wall_z,  &beams.inverse, &beams.error};
-    for (std::size_t i = 0; i < 11; ++i) {
+    float** const into[] = {&beams.cosine, &beams.sine, &beams.range,  &beams.along_y, &beams.along_z,
+                            &beams.y,      &beams.z,    &beams.wall_y, &beams.wall_z,  &beams.inverse};
+    for (std::size_t i = 0; i < 10; ++i) {
       arrays[i].resize(count);
       *into[i] = arrays[i].data();
     }
@@ -62,9 +61,12 @@ std::vector<float> everything(const BeamKernels& k, const std::vector<float>& ra
     k.fit(a.beams, p, 0.3F, 5, unknowns, sums);
     for (const auto& row : sums.normal) out.insert(out.end(), row, row + 4);
     out.insert(out.end(), sums.gradient, sums.gradient + 4);
-    out.push_back(k.neighbours(a.beams));
     out.insert(out.end(), {sums.square, sums.absolute, sums.inliers, sums.beyond, sums.expected});
   }
+  Evidence e;
+  k.weigh(a.beams, 0.3F, 5, e);
+  out.insert(out.end(),
+             {e.facing_yy, e.facing_yz, e.facing_zz, e.square_y, e.square_z, e.shared_y, e.shared_z});
   return out;
 }
 

@@ -51,7 +51,8 @@ MatcherSettings scan_to_scan(std::size_t beams) {
           .vantage_spread = 0,
           .least_inliers = 0.4,
           .most_beyond = 1,  // a room has more behind its corners than the scan before saw
-          .most_correlation = 1,
+          .least_facing = 0,
+          .most_misfit_m = 1,
           .ambiguity = 1};
 }
 
