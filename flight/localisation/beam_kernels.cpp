@@ -25,6 +25,7 @@ struct Eight {
 };
 
 constexpr std::size_t kSums = 8;
+static_assert(Evidence::kNeighbours <= kSums);
 
 constexpr float kFar_m = 1e7F;
 
@@ -109,7 +110,8 @@ struct Body {
   }
 
   template <int unknowns>
-  TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, FitSums& sums) {
+  TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, float most_slope,
+                          FitSums& sums) {
     Floats normal[unknowns * (unknowns + 1) / 2][kParts] = {};
     Floats gradient[unknowns][kParts] = {};
     Floats square[kParts] = {};
@@ -124,7 +126,8 @@ struct Body {
       const Floats inverse = *reinterpret_cast<const Floats*>(beams.inverse + i);
       const Floats wall_y = *reinterpret_cast<const Floats*>(beams.wall_y + i);
       const Floats wall_z = *reinterpret_cast<const Floats*>(beams.wall_z + i);
-      const Ints met = (range > 0.0F) & (inverse > 0.0F);
+      const Ints met = (range > 0.0F) & (inverse > 0.0F) &
+                       (wall_y * wall_y + wall_z * wall_z < most_slope * most_slope * inverse * inverse);
       const Floats should = one / (met ? inverse : one);
       const Floats error = range - should;
       const Ints in = met & (error < gate) & (error > -gate);
@@ -163,10 +166,58 @@ struct Body {
     }
   }
 
-  TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, int unknowns, FitSums& sums) {
-    if (unknowns == 2) return fit<2>(beams, p, gate, sums);
-    if (unknowns == 3) return fit<3>(beams, p, gate, sums);
-    fit<4>(beams, p, gate, sums);
+  TUNNELRIG_BODY void fit(const Beams& beams, const Projection& p, float gate, float most_slope, int unknowns,
+                          FitSums& sums) {
+    if (unknowns == 2) return fit<2>(beams, p, gate, most_slope, sums);
+    if (unknowns == 3) return fit<3>(beams, p, gate, most_slope, sums);
+    fit<4>(beams, p, gate, most_slope, sums);
+  }
+
+  TUNNELRIG_BODY void weigh(const Beams& beams, float gate, float most_slope, Evidence& evidence) {
+    Floats facing_yy[kParts] = {};
+    Floats facing_yz[kParts] = {};
+    Floats facing_zz[kParts] = {};
+    Floats square_y[kParts] = {};
+    Floats square_z[kParts] = {};
+    const Floats zero = {};
+    const Floats one = zero + 1.0F;
+    for (std::size_t i = 0, part = 0; i < beams.padded; i += kWidth, part = (part + 1) % kParts) {
+      const Floats range = *reinterpret_cast<const Floats*>(beams.range + i);
+      const Floats inverse = *reinterpret_cast<const Floats*>(beams.inverse + i);
+      const Floats wall_y = *reinterpret_cast<const Floats*>(beams.wall_y + i);
+      const Floats wall_z = *reinterpret_cast<const Floats*>(beams.wall_z + i);
+      const Floats wall_squared = wall_y * wall_y + wall_z * wall_z;
+      const Ints met =
+          (range > 0.0F) & (inverse > 0.0F) & (wall_squared < most_slope * most_slope * inverse * inverse);
+      const Floats error = range - one / (met ? inverse : one);
+      const Ints in = met & (error < gate) & (error > -gate);
+      const Floats unit = (in ? one : zero) / (met ? wall_squared : one);
+      facing_yy[part] += wall_y * wall_y * unit;
+      facing_yz[part] += wall_y * wall_z * unit;
+      facing_zz[part] += wall_z * wall_z * unit;
+      const Floats distance = error * inverse * unit;  // over the length of the wall's vector
+      const Floats y = wall_y * distance;
+      const Floats z = wall_z * distance;
+      square_y[part] += y * y;
+      square_z[part] += z * z;
+      *reinterpret_cast<Floats*>(beams.y + i) = y;
+      *reinterpret_cast<Floats*>(beams.z + i) = z;
+    }
+    Floats shared_y[kParts] = {};
+    Floats shared_z[kParts] = {};
+    // The last few beams count as neighbours only.
+    for (std::size_t i = 0, part = 0; i + kSums < beams.padded; i += kWidth, part = (part + 1) % kParts) {
+      Floats y = {};
+      Floats z = {};
+      for (std::size_t apart = 1; apart <= Evidence::kNeighbours; ++apart) {
+        y += *reinterpret_cast<const Loose*>(beams.y + i + apart);
+        z += *reinterpret_cast<const Loose*>(beams.z + i + apart);
+      }
+      shared_y[part] += *reinterpret_cast<const Floats*>(beams.y + i) * y;
+      shared_z[part] += *reinterpret_cast<const Floats*>(beams.z + i) * z;
+    }
+    evidence = {total(facing_yy), total(facing_yz), total(facing_zz), total(square_y),
+                total(square_z),  total(shared_y),  total(shared_z)};
   }
 
   TUNNELRIG_BODY void correlate(const std::uint16_t* histogram, const std::int32_t* start,
@@ -211,41 +262,47 @@ struct Body {
   }
 };
 
-// One struct of functions per instruction set, each with the bodies compiled for it.
-#define TUNNELRIG_FORM(form, width, target)                                                                 \
-  struct form {                                                                                             \
-    target static int load(const float* range, const Beams& beams, float least, float most) {               \
-      return Body<width>::load(range, beams, least, most);                                                  \
-    }                                                                                                       \
-    target static void project(const Beams& beams, const Projection& p) { Body<width>::project(beams, p); } \
-    target static void cells(const Beams& beams, float y, float z, float offset, float last,                \
-                             std::int32_t* cell) {                                                          \
-      Body<width>::cells(beams, y, z, offset, last, cell);                                                  \
-    }                                                                                                       \
-    target static void see(const Beams& beams, std::size_t first, std::size_t last, float y, float z) {     \
-      Body<width>::see(beams, first, last, y, z);                                                           \
-    }                                                                                                       \
-    target static void fit(const Beams& beams, const Projection& p, float gate, int unknowns,               \
-                           FitSums& sums) {                                                                 \
-      Body<width>::fit(beams, p, gate, unknowns, sums);                                                     \
-    }                                                                                                       \
-    target static void correlate(const std::uint16_t* histogram, const std::int32_t* start,                 \
-                                 const float* weight, std::size_t cell_count, float* out,                   \
-                                 std::size_t size) {                                                        \
-      Body<width>::correlate(histogram, start, weight, cell_count, out, size);                              \
-    }                                                                                                       \
-    target static void smooth(const float* in, const float* tap, std::size_t taps, float* out,              \
-                              std::size_t size) {                                                           \
-      Body<width>::smooth(in, tap, taps, out, size);                                                        \
-    }                                                                                                       \
-    target static float maximum(const float* in, std::size_t size) {                                        \
-      return Body<width>::maximum(in, size);                                                                \
-    }                                                                                                       \
-    static const BeamKernels& kernels(const char* name) {                                                   \
-      static const BeamKernels all{name, load, project, cells, see, fit, correlate, smooth, maximum};       \
-      return all;                                                                                           \
-    }                                                                                                       \
+// One struct of functions per instruction set, each with the bodies compiled for it. An attribute cannot
+// stand in parentheses. NOLINTBEGIN(bugprone-macro-parentheses)
+#define TUNNELRIG_FORM(form, width, target)                                                                  \
+  struct form {                                                                                              \
+    target static int load(const float* range, const Beams& beams, float least, float most) {                \
+      return Body<width>::load(range, beams, least, most);                                                   \
+    }                                                                                                        \
+    target static void project(const Beams& beams, const Projection& p) { Body<width>::project(beams, p); }  \
+    target static void cells(const Beams& beams, float y, float z, float offset, float last,                 \
+                             std::int32_t* cell) {                                                           \
+      Body<width>::cells(beams, y, z, offset, last, cell);                                                   \
+    }                                                                                                        \
+    target static void see(const Beams& beams, std::size_t first, std::size_t last, float y, float z) {      \
+      Body<width>::see(beams, first, last, y, z);                                                            \
+    }                                                                                                        \
+    target static void fit(const Beams& beams, const Projection& p, float gate, float most_slope,            \
+                           int unknowns, FitSums& sums) {                                                    \
+      Body<width>::fit(beams, p, gate, most_slope, unknowns, sums);                                          \
+    }                                                                                                        \
+    target static void weigh(const Beams& beams, float gate, float most_slope, Evidence& evidence) {         \
+      Body<width>::weigh(beams, gate, most_slope, evidence);                                                 \
+    }                                                                                                        \
+    target static void correlate(const std::uint16_t* histogram, const std::int32_t* start,                  \
+                                 const float* weight, std::size_t cell_count, float* out,                    \
+                                 std::size_t size) {                                                         \
+      Body<width>::correlate(histogram, start, weight, cell_count, out, size);                               \
+    }                                                                                                        \
+    target static void smooth(const float* in, const float* tap, std::size_t taps, float* out,               \
+                              std::size_t size) {                                                            \
+      Body<width>::smooth(in, tap, taps, out, size);                                                         \
+    }                                                                                                        \
+    target static float maximum(const float* in, std::size_t size) {                                         \
+      return Body<width>::maximum(in, size);                                                                 \
+    }                                                                                                        \
+    static const BeamKernels& kernels(const char* name) {                                                    \
+      static const BeamKernels all{name, load, project, cells, see, fit, weigh, correlate, smooth, maximum}; \
+      return all;                                                                                            \
+    }                                                                                                        \
   };
+
+// NOLINTEND(bugprone-macro-parentheses)
 
 TUNNELRIG_FORM(Portable, Four, )
 #if TUNNELRIG_X86

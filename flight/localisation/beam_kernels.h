@@ -61,6 +61,15 @@ struct FitSums {
   float expected = 0;       // beams with a return and a wall to meet
 };
 
+/// What a fit rests on, along y and z: sums over the beams that count, n the unit normal of a beam's wall, d
+/// the distance of its end from that wall.
+struct Evidence {
+  static constexpr std::size_t kNeighbours = 4;
+  float facing_yy = 0, facing_yz = 0, facing_zz = 0;  // Σ n nᵀ, in beams
+  float square_y = 0, square_z = 0;                   // Σ (n d)²
+  float shared_y = 0, shared_z = 0;  // Σ (n d)(n d)' over pairs of up to kNeighbours beams apart
+};
+
 struct BeamKernels {
   const char* instruction_set;
   /// Copies ranges, those outside of (least, most) as 0. The number that are inside, or −1 where one is NaN.
@@ -71,7 +80,11 @@ struct BeamKernels {
                 std::int32_t* cell);
   /// Beams first … last − 1 may meet a wall; the nearest of all walls stays.
   void (*see)(const Beams& beams, std::size_t first, std::size_t last, float wall_y, float wall_z);
-  void (*fit)(const Beams& beams, const Projection& projection, float gate, int unknowns, FitSums& sums);
+  /// Beams that meet their wall at more than `most_slope` = 1 / cos(incidence) do not count.
+  void (*fit)(const Beams& beams, const Projection& projection, float gate, float most_slope, int unknowns,
+              FitSums& sums);
+  /// Beams count as in fit. Uses beams.y and beams.z as working memory.
+  void (*weigh)(const Beams& beams, float gate, float most_slope, Evidence& evidence);
   /// out[i] = Σ weight[k] histogram[start[k] − i]: the correlation (6.9) with a reference of few cells.
   void (*correlate)(const std::uint16_t* histogram, const std::int32_t* start, const float* weight,
                     std::size_t cells, float* out, std::size_t size);

@@ -4,6 +4,7 @@
 
 #include "datasets/error.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -16,7 +17,8 @@ namespace tunnelrig {
 struct GateSettings {
   double sigma = 5;  // innovations beyond it are turned away
   /// After so many in a row the filter, not the matcher, is taken to be wrong: its position is made as
-  /// uncertain as the innovation is large and the correction accepted. 0 never does.
+  /// uncertain as the innovation is large, its velocity as uncertain as one that led there since the last
+  /// accepted correction, and the correction accepted. 0 never does.
   int most_rejections = 10;
 };
 
@@ -59,6 +61,7 @@ class DelayedFilter {
     ++next_;
     if (next_ - first_ > kRemembered) first_ = next_ - kRemembered;
     model_.step(now_, input, dt_s, true);
+    since_accepted_s_ += dt_s;
   }
 
   /// A position with its covariance, measured `age_s` ago. Throws InputError where a value is not finite, the
@@ -79,7 +82,7 @@ class DelayedFilter {
     Belief<Model::kStates> then = divided.before;
     const double into_step_s = -before_end_s;
     if (into_step_s > kInstant_s) model_.step(then, divided.input, into_step_s, false);
-    const Correction result = update(then, position_m, covariance_m2);
+    Correction result = update(then, position_m, covariance_m2);
     if (!result.accepted) return result;
 
     divided.before = then;
@@ -129,11 +132,17 @@ class DelayedFilter {
     result.nis = result.innovation_m.dot(result.innovation_covariance_m2.inverse() * result.innovation_m);
     if (result.nis > gate_.sigma * gate_.sigma) {
       if (gate_.most_rejections == 0 || ++rejections_ <= gate_.most_rejections) return result;
-      p.template topLeftCorner<2, 2>() += result.innovation_m.squaredNorm() * Eigen::Matrix2d::Identity();
+      // A position alone would drift off again: what led it astray (a bias, a blow) went through the
+      // velocity.
+      const double square_m2 = result.innovation_m.squaredNorm();
+      const double astray_s = std::max(since_accepted_s_, kLongest_step_s);
+      p.template topLeftCorner<2, 2>() += square_m2 * Eigen::Matrix2d::Identity();
+      p.template block<2, 2>(2, 2) += square_m2 / (astray_s * astray_s) * Eigen::Matrix2d::Identity();
       result.innovation_covariance_m2 = p.template topLeftCorner<2, 2>() + covariance_m2;
       result.nis = result.innovation_m.dot(result.innovation_covariance_m2.inverse() * result.innovation_m);
     }
     rejections_ = 0;
+    since_accepted_s_ = 0;
     result.accepted = true;
 
     using Gain = Eigen::Matrix<double, Model::kStates, 2>;
@@ -156,6 +165,7 @@ class DelayedFilter {
       0;  // past_ holds the steps from first_ to before next_, each at its number modulo kRemembered
   std::size_t next_ = 0;
   int rejections_ = 0;
+  double since_accepted_s_ = 0;
 };
 
 }  // namespace tunnelrig

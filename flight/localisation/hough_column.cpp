@@ -39,7 +39,7 @@ HoughColumn::HoughColumn(double direction_rad, std::span<const SectionPoint> ref
 
 void HoughColumn::keep_highest_cells(std::span<const SectionPoint> reference) {
   // As seen from the first of raw_'s shifts
-  const double first = first_shift_m_ - cell_m_ * static_cast<double>(taps_.size() / 2);
+  const double first = first_shift_m_ - cell_m_ * 0.5 * static_cast<double>(taps_.size() - 1);
   std::vector<float> count(histogram_.size() / 2);
   for (const SectionPoint& point : reference) {
     const double at = (cosine_ * point.x() + sine_ * point.y() - first) / cell_m_ + offset_;
@@ -53,7 +53,7 @@ void HoughColumn::keep_highest_cells(std::span<const SectionPoint> reference) {
   for (const std::int32_t cell : order) {
     if (start_.size() == kMost_cells || value(cell) < kLeast_share * most || value(cell) == 0) break;
     start_.push_back(cell);
-    weight_.push_back(value(cell) / most);
+    weight_.push_back(value(cell) / static_cast<float>(reference.size()));
   }
 }
 

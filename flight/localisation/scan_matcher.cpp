@@ -19,6 +19,7 @@ constexpr double kMost_tilt_cosine = 0.2588190451025207;  // 75°
 constexpr int kMost_steps = 8;
 constexpr double kConverged_m = 2e-4;
 constexpr double kSame_place_m = 0.1;
+constexpr double kChance_sigma = 3;  // of what neighbours share by chance
 
 void check(std::string_view name, double value, double lowest, double highest) {
   if (!(value >= lowest && value <= highest))
@@ -41,6 +42,7 @@ void check(const MatcherSettings& s) {
   check("most_range_m", s.most_range_m, s.least_range_m, 1e4);
   check("first_gate_m", s.first_gate_m, 1e-3, 10);
   check("gate_sigma", s.gate_sigma, 1, 100);
+  check("most_slope", s.most_slope, 1, 1e6);
   check("least_sigma_m", s.least_sigma_m, 1e-6, 1);
   check("prior_gate_m", s.prior_gate_m, 0, 1e4);
   check("vantage_spread", s.vantage_spread, 0, 0.95);
@@ -49,6 +51,8 @@ void check(const MatcherSettings& s) {
   check("most_beyond", s.most_beyond, 0, 1);
   check("most_sigma_m", s.most_sigma_m, 1e-6, 1e3);
   check("most_residual_m", s.most_residual_m, 1e-6, 1e3);
+  check("least_facing", s.least_facing, 0, 1);
+  check("most_misfit_m", s.most_misfit_m, 1e-6, 1e3);
   check("ambiguity", s.ambiguity, 0, 1);
 }
 
@@ -86,6 +90,11 @@ Eigen::Matrix2d turn(double angle_rad) {
       .finished();
 }
 
+/// Of a symmetric matrix: the larger eigenvalue.
+double largest(const Eigen::Matrix2d& m) {
+  return 0.5 * m.trace() + std::hypot(0.5 * (m(0, 0) - m(1, 1)), m(0, 1));
+}
+
 /// Where a match stands: position, rotation in the scan plane, and the logarithm of the stretch of y.
 struct Pose {
   SectionPoint position{0, 0};
@@ -99,6 +108,8 @@ struct Fit {
   double inliers = 0;  // beams
   double beyond = 0;
   double residual_m = 0;
+  double misfit_m = 0;  // along the axis where it is more
+  double facing = 0;    // beams, along the axis where it is fewer
   bool solved = false;
 };
 
@@ -214,7 +225,7 @@ struct ScanMatcher::Work {
   /// not far before its wall) lowers that, and would raise a gate made from the RMS until it is let in.
   static bool heavy_tailed(const FitSums& sums) {
     constexpr float kGaussian = 0.797885F;
-    constexpr float kLeast_share = 0.9F;
+    constexpr float kLeast_share = 0.95F;
     return sums.absolute < kLeast_share * kGaussian * std::sqrt(sums.square * sums.inliers);
   }
 
@@ -241,10 +252,12 @@ struct ScanMatcher::Work {
     walls.look(kernels, beams, now, fit.pose.position);
     FitSums sums;
     const int size = unknowns();
-    kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), size, sums);
+    kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), static_cast<float>(settings.most_slope),
+                size, sums);
     if (heavy_tailed(sums)) {
       gate_m = tight_gate_m(gate_m);
-      kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), size, sums);
+      kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), static_cast<float>(settings.most_slope),
+                  size, sums);
     }
     fit.inliers = sums.inliers;
     fit.beyond = sums.beyond;
@@ -295,7 +308,28 @@ struct ScanMatcher::Work {
       gate = std::min(gate, tight);
       if (moved < kConverged_m || (moved < 5 * kConverged_m && same_gate && i > 0)) break;
     }
+    if (fit.solved) weigh(fit, gate);
     return fit;
+  }
+
+  /// What the section is wrong by does not average out over beams as noise does: it is added to the
+  /// covariance.
+  void weigh(Fit& fit, double gate_m) const {
+    Evidence e;
+    kernels.weigh(beams, static_cast<float>(gate_m), static_cast<float>(settings.most_slope), e);
+    constexpr double kPairs = Evidence::kNeighbours;
+    const auto misfit_m2 = [](double shared, double square, double facing) {
+      if (facing < 1) return 0.0;
+      const double by_chance = kChance_sigma * square / std::sqrt(kPairs * facing);
+      return std::max((shared / kPairs - by_chance) / facing, 0.0);
+    };
+    const double misfit = std::max(misfit_m2(e.shared_y, e.square_y, e.facing_yy),
+                                   misfit_m2(e.shared_z, e.square_z, e.facing_zz));
+    fit.misfit_m = std::sqrt(misfit);
+    fit.covariance.topLeftCorner<2, 2>() += misfit * Eigen::Matrix2d::Identity();
+    const Eigen::Matrix2d facing =
+        (Eigen::Matrix2d() << e.facing_yy, e.facing_yz, e.facing_yz, e.facing_zz).finished();
+    fit.facing = facing.trace() - largest(facing);
   }
 
   Rejection judge(const Fit& fit) const {
@@ -304,23 +338,36 @@ struct ScanMatcher::Work {
       return Rejection::poor_fit;
     if (!fit.solved) return Rejection::unobservable;
     if (fit.residual_m > settings.most_residual_m) return Rejection::noisy;
-    const Eigen::Matrix2d c = fit.covariance.topLeftCorner<2, 2>();
-    const double middle = 0.5 * (c(0, 0) + c(1, 1));
-    const double largest = middle + std::hypot(0.5 * (c(0, 0) - c(1, 1)), c(0, 1));
-    if (!(largest <= settings.most_sigma_m * settings.most_sigma_m)) return Rejection::unobservable;
+    if (fit.misfit_m > settings.most_misfit_m) return Rejection::poor_fit;
+    if (fit.facing < settings.least_facing * static_cast<double>(beams.count) ||
+        largest(fit.covariance.topLeftCorner<2, 2>()) > settings.most_sigma_m * settings.most_sigma_m)
+      return Rejection::unobservable;
     return Rejection::none;
+  }
+
+  /// Of y, that a match may begin with: yaws of 0, 18°, 30° and 42° more than the IMU's
+  std::vector<double> stretches() const {
+    if (settings.unknowns != Unknowns::rotation_and_heading) return {0};
+    return {0, -0.05, -0.14, -0.30};
   }
 
   /// All maxima of the Hough domain, where the highest is not plainly the right one.
   Rejection choose(const SearchBox& where, double rotation_rad, Fit& fit) {
-    project({{0, 0}, rotation_rad, 0});
-    const std::vector<Start> starts =
-        std::visit([&](const auto& form) { return form.candidates(kernels, where); }, search);
     std::vector<Fit> good;
-    for (const Start& start : starts) {
-      project({{0, 0}, rotation_rad, 0});
-      const Fit other = refine({start.position, rotation_rad, 0});
-      if (judge(other) == Rejection::none) good.push_back(other);
+    for (const double stretch : stretches()) {
+      const Pose view{{0, 0}, rotation_rad, stretch};
+      project(view);
+      const std::vector<Start> starts = std::visit(
+          [&](auto& form) {
+            form.take(kernels, beams);
+            return form.candidates(kernels, where);
+          },
+          search);
+      for (const Start& start : starts) {
+        project(view);
+        const Fit other = refine({start.position, rotation_rad, stretch});
+        if (judge(other) == Rejection::none) good.push_back(other);
+      }
     }
     if (good.empty()) return judge(fit);
     fit = *std::max_element(good.begin(), good.end(),

@@ -38,17 +38,27 @@ struct MatcherSettings {
   double most_range_m = 30;
   double first_gate_m = 0.20;    // beams further from the wall they should meet do not count at first,
   double gate_sigma = 4;         // then beyond so many standard deviations of those that did
+  double most_slope = 12;        // 1 / cos(incidence): beams that graze a wall more say little of where it is
   double least_sigma_m = 0.003;  // of a range, whatever the scan's own residuals say
   double prior_gate_m = 0.25;    // arg max within this of a prior, where one is given
   double vantage_spread = 0.6;   // part of the section that the reference is seen from; 0: its origin alone
 
   // What is rejected.
   std::size_t least_beams = 60;
-  double least_inliers = 0.6;    // of the beams with a return
-  double most_beyond = 0.15;     // of them: a beam cannot see through a wall, if it is the right tunnel
-  double most_sigma_m = 0.05;    // of the position along its worst axis
-  double most_residual_m = 0.1;  // RMS of the beams that fit
-  double ambiguity = 0.9;        // another place that fits with this share of the inliers
+  /// Of the beams with a return. Two walls of a wider tunnel, seen from their corner, can take up to
+  /// 0.76 of a scan.
+  double least_inliers = 0.78;
+  double most_beyond = 0.1;  // of them: a beam cannot see through a wall, if it is the right tunnel
+  /// Of all beams: so many must face the direction in which the position is known worst. A few beams beside a
+  /// corner fit wherever that corner is put.
+  double least_facing = 0.08;
+  double most_sigma_m = 0.05;     // of the position along its worst axis
+  double most_residual_m = 0.08;  // RMS of the beams that fit
+  /// Noise differs from beam to beam, a wrong shape is wrong over many: RMS of what the distances from the
+  /// walls that face one axis share with those of neighbouring beams, where it is more than noise alone may
+  /// show.
+  double most_misfit_m = 0.012;
+  double ambiguity = 0.8;  // another place that fits with this share of the inliers
 };
 
 enum class Rejection { none, few_beams, poor_fit, noisy, unobservable, ambiguous, outside };

@@ -91,7 +91,7 @@ std::vector<Start> AllDirectionSearch::grid(const SearchBox& box) const {
   const Eigen::Vector2d size = box.highest - box.lowest;
   const auto steps_y = static_cast<int>(std::ceil(size.x() / step_m_));
   const auto steps_z = static_cast<int>(std::ceil(size.y() / step_m_));
-  std::vector<float> score(static_cast<std::size_t>(steps_z + 1));
+  std::vector<float> score(static_cast<std::size_t>(steps_z) + 1);
   std::vector<Start> all;
   for (int i = 0; i <= steps_y; ++i) {
     const SectionPoint from = box.lowest + SectionPoint(step_m_ * i, 0);
@@ -123,7 +123,7 @@ CircleSearch::CircleSearch(const CrossSection& /*section*/, std::span<const Sect
     circle_.emplace_back(settings.circle_diameter_m / 2 * std::cos(angle),
                          settings.circle_diameter_m / 2 * std::sin(angle));
   }
-  votes_.resize(static_cast<std::size_t>(cells_ * cells_));
+  votes_.resize(static_cast<std::size_t>(cells_) * static_cast<std::size_t>(cells_));
   smoothed_.resize(votes_.size());
 }
 
@@ -135,16 +135,14 @@ void CircleSearch::take(const BeamKernels& /*kernels*/, const Beams& beams) {
     for (const SectionPoint& wall : circle_) {
       const auto y = static_cast<int>(std::floor((wall.x() - beams.y[i] - lowest_m_) / cell_m_));
       const auto z = static_cast<int>(std::floor((wall.y() - beams.z[i] - lowest_m_) / cell_m_));
-      if (y >= 0 && y < cells_ && z >= 0 && z < cells_) votes_[static_cast<std::size_t>(y * cells_ + z)] += 1;
+      if (y >= 0 && y < cells_ && z >= 0 && z < cells_) votes_[index(y, z)] += 1;
     }
   }
   std::fill(smoothed_.begin(), smoothed_.end(), 0.0F);
   for (int y = 1; y + 1 < cells_; ++y)
     for (int z = 1; z + 1 < cells_; ++z)
       for (int dy = -1; dy <= 1; ++dy)
-        for (int dz = -1; dz <= 1; ++dz)
-          smoothed_[static_cast<std::size_t>(y * cells_ + z)] +=
-              votes_[static_cast<std::size_t>((y + dy) * cells_ + z + dz)];
+        for (int dz = -1; dz <= 1; ++dz) smoothed_[index(y, z)] += votes_[index(y + dy, z + dz)];
 }
 
 std::vector<Start> CircleSearch::grid(const SearchBox& box) const {
@@ -153,7 +151,7 @@ std::vector<Start> CircleSearch::grid(const SearchBox& box) const {
     for (int z = 0; z < cells_; ++z) {
       const SectionPoint at = SectionPoint(y + 0.5, z + 0.5) * cell_m_ + SectionPoint(lowest_m_, lowest_m_);
       if ((at.array() < box.lowest.array()).any() || (at.array() > box.highest.array()).any()) continue;
-      all.push_back({at, smoothed_[static_cast<std::size_t>(y * cells_ + z)]});
+      all.push_back({at, smoothed_[index(y, z)]});
     }
   return all;
 }

@@ -69,6 +69,9 @@ class CircleSearch {
   std::vector<Start> candidates(const BeamKernels& kernels, const SearchBox& box) const;
 
  private:
+  std::size_t index(int y, int z) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(cells_) + static_cast<std::size_t>(z);
+  }
   std::vector<Start> grid(const SearchBox& box) const;
 
   double cell_m_;

@@ -32,6 +32,7 @@ std::vector<SectionPoint> circle_outline(double diameter_m, int segments) {
   const double step = 2 * std::numbers::pi / segments;
   const double radius = diameter_m / 2 * std::sqrt(step / std::sin(step));
   std::vector<SectionPoint> outline;
+  outline.reserve(static_cast<std::size_t>(segments));
   for (int i = 0; i < segments; ++i)
     outline.emplace_back(radius * std::cos((i + 0.5) * step), radius * std::sin((i + 0.5) * step));
   return outline;
@@ -45,7 +46,7 @@ std::vector<SectionPoint> with_features(const std::vector<SectionPoint>& outline
   std::vector<SectionPoint> result;
   std::size_t next = 0;
   for (std::size_t edge = 0; edge < outline.size(); ++edge) {
-    const SectionPoint start = outline[edge];
+    const SectionPoint& start = outline[edge];
     const SectionPoint whole = outline[(edge + 1) % outline.size()] - start;
     const SectionPoint along = whole.normalized();
     const SectionPoint inward(-along.y(), along.x());

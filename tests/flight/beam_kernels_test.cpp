@@ -58,11 +58,15 @@ std::vector<float> everything(const BeamKernels& k, const std::vector<float>& ra
   k.see(a.beams, range.size() / 2, range.size(), -0.8F, 0.9F);
   for (const int unknowns : {2, 3, 4}) {
     FitSums sums;
-    k.fit(a.beams, p, 0.3F, unknowns, sums);
+    k.fit(a.beams, p, 0.3F, 5, unknowns, sums);
     for (const auto& row : sums.normal) out.insert(out.end(), row, row + 4);
     out.insert(out.end(), sums.gradient, sums.gradient + 4);
     out.insert(out.end(), {sums.square, sums.absolute, sums.inliers, sums.beyond, sums.expected});
   }
+  Evidence e;
+  k.weigh(a.beams, 0.3F, 5, e);
+  out.insert(out.end(),
+             {e.facing_yy, e.facing_yz, e.facing_zz, e.square_y, e.square_z, e.shared_y, e.shared_z});
   return out;
 }
 

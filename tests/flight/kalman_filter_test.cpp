@@ -6,6 +6,7 @@
 #include "support/message_of.h"
 #include "support/seeds.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -120,6 +121,21 @@ TEST(KalmanFilter, GateTurnsOutliersAwayAndReopens) {
   EXPECT_FALSE(filter.correct({1, 1}, kNoise).accepted);
   EXPECT_TRUE(filter.correct({1, 1}, kNoise).accepted);
   EXPECT_LT((filter.position_m() - Eigen::Vector2d(1, 1)).norm(), 0.01);
+}
+
+TEST(KalmanFilter, ABiasItDoesNotKnowOfDoesNotCarryItAway) {
+  SCOPED_TRACE(testing::Message() << "seed " << test::seed());
+  Random random;
+  KalmanFilter filter({0, 0});
+  constexpr double kNoise_m = 0.002;
+  const Eigen::Matrix2d noise = kNoise_m * kNoise_m * Eigen::Matrix2d::Identity();
+  double worst_m = 0;
+  for (int i = 1; i <= 400 * 20; ++i) {  // at rest for 20 s, with what a tilt error of 1.2° reads as
+    filter.predict(Eigen::Vector2d(0.2, -0.2) + 0.15 * random.vector(), kStep_s);
+    if (i % 10 == 0) filter.correct(kNoise_m * random.vector(), noise);
+    worst_m = std::max(worst_m, filter.position_m().norm());
+  }
+  EXPECT_LT(worst_m, 0.05);
 }
 
 /// Mean NEES and NIS of a filter told the truth about its noises, over independent runs.

@@ -56,8 +56,8 @@ std::vector<Section> sections() {
           {"furnished", furnished(), 0.7, two},
           {"arch", CrossSection(arch_outline(4.5, 5, 2.75)), 1.2, two},
           {"arch_all", CrossSection(arch_outline(4.5, 5, 2.75)), 1.2, all},
-          {"circle", CrossSection(circle_outline(2)), 0.5, circle},
-          {"circle_all", CrossSection(circle_outline(2)), 0.5, all}};
+          {"circle", CrossSection(circle_outline(2)), 0.35, circle},
+          {"circle_all", CrossSection(circle_outline(2)), 0.35, all}};
 }
 
 /// Section × noise × share of blocked beams × rotation left unknown.
@@ -167,7 +167,9 @@ TEST(ScanMatcher, RejectsBlockedAndEmptySight) {
   SimulatedLidar lidar(kSquare, {.range_sigma_m = 0.01}, test::seed());
   Scan blocked = lidar.sweep({{0, 0}, {}});
   block(blocked, 0, 0.8);
-  EXPECT_FALSE(matcher.match(blocked, {}).accepted);
+  const Match of_blocked = matcher.match(blocked, {});
+  EXPECT_FALSE(of_blocked.accepted) << of_blocked.position_m.transpose() << ", quality " << of_blocked.quality
+                                    << ", residual " << of_blocked.residual_m;
   Scan dark;
   dark.range_m.assign(541, 0);
   EXPECT_EQ(matcher.match(dark, {}).reason, Rejection::few_beams);
