@@ -12,11 +12,6 @@ void check(const char* name, double value, double lowest, double highest) {
     throw InputError::in("LIDAR", "{} is {}: it lies between {} and {}", name, value, lowest, highest);
 }
 
-Attitude between(const Attitude& a, const Attitude& b, double t) {
-  return {std::lerp(a.roll_rad, b.roll_rad, t), std::lerp(a.pitch_rad, b.pitch_rad, t),
-          std::lerp(a.yaw_rad, b.yaw_rad, t)};
-}
-
 bool same(const Attitude& a, const Attitude& b) {
   return a.roll_rad == b.roll_rad && a.pitch_rad == b.pitch_rad && a.yaw_rad == b.yaw_rad;
 }
@@ -44,12 +39,14 @@ Scan SimulatedLidar::sweep(const LidarPose& start, const LidarPose& end) {
   Scan scan;
   scan.range_m.reserve(directions_.size());
   const bool turning = !same(start.attitude, end.attitude);
-  Eigen::Matrix2d projection = section_projection(start.attitude);
+  // Linear between the ends: a turn of a degree in the sweep bends the beams by less than 0.1 mrad more.
+  const Eigen::Matrix2d first = section_projection(start.attitude);
+  const Eigen::Matrix2d change = turning ? Eigen::Matrix2d(section_projection(end.attitude) - first)
+                                         : Eigen::Matrix2d(Eigen::Matrix2d::Zero());
   for (std::size_t i = 0; i < directions_.size(); ++i) {
     const double t = static_cast<double>(i) / static_cast<double>(directions_.size() - 1);
-    if (turning) projection = section_projection(between(start.attitude, end.attitude, t));
     const SectionPoint from = start.position + t * (end.position - start.position);
-    scan.range_m.push_back(static_cast<float>(measured_m(range_m(from, projection * directions_[i]))));
+    scan.range_m.push_back(static_cast<float>(measured_m(range_m(from, (first + t * change) * directions_[i]))));
   }
   return scan;
 }
@@ -60,7 +57,7 @@ double SimulatedLidar::range_m(const SectionPoint& from, const SectionPoint& dir
   const double to_wall = section_.ray(from, direction);
   const double hit_z = from.y() + to_wall * direction.y();
   if (!(hit_z < settings_.puddle_top_m)) return to_wall;
-  if (from.y() <= settings_.puddle_top_m || uniform_(random_) >= settings_.puddle_mirror_share)
+  if (from.y() <= settings_.puddle_top_m || random_.uniform() >= settings_.puddle_mirror_share)
     return INFINITY;
   const double to_water = (settings_.puddle_top_m - from.y()) / direction.y();
   const SectionPoint up(direction.x(), -direction.y());
@@ -69,8 +66,8 @@ double SimulatedLidar::range_m(const SectionPoint& from, const SectionPoint& dir
 
 double SimulatedLidar::measured_m(double range_m) {
   // Every beam draws the same numbers, so that one beam's fate does not change another's noise.
-  const double noisy = range_m + settings_.range_sigma_m * normal_(random_);
-  const bool dropped = uniform_(random_) < settings_.dropout_share;
+  const double noisy = range_m + settings_.range_sigma_m * random_.normal();
+  const bool dropped = random_.uniform() < settings_.dropout_share;
   if (dropped || !(noisy >= settings_.least_range_m && noisy <= settings_.most_range_m)) return 0;
   return settings_.resolution_m > 0 ? settings_.resolution_m * std::round(noisy / settings_.resolution_m)
                                     : noisy;

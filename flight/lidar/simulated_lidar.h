@@ -4,9 +4,9 @@
 
 #include "flight/lidar/scan.h"
 #include "flight/tunnel/cross_section.h"
+#include "flight/vehicle/random.h"
 
 #include <cstdint>
-#include <random>
 
 namespace tunnelrig {
 
@@ -53,9 +53,7 @@ class SimulatedLidar {
   CrossSection section_;
   LidarSettings settings_;
   std::vector<Eigen::Vector2d> directions_;
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
-  std::uniform_real_distribution<double> uniform_{0, 1};
+  Random random_;
 };
 
 }  // namespace tunnelrig
