@@ -203,6 +203,22 @@ void add_tares(const CampaignData& data, const Grouping& grouping, const Reducti
   }
 }
 
+/// The adopted effects' parameters, to first order.
+void add_model(const CampaignData& data, const Grouping& grouping, const Reduction& reduction,
+               std::vector<SharedSource>& sources) {
+  const AppliedModel& model = reduction.model;
+  if (model.covariance.size() == 0) return;
+  sources.push_back(shared_source(
+      &Budget::model, grouping, reduction, data.info.rig, model.covariance, model.dof,
+      [&](const RunCoefficients& run) {
+        Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(data.info.rig.rotors, model.covariance.rows());
+        for (Eigen::Index rotor = 0; rotor < slope.rows(); ++rotor)
+          for (Eigen::Index k = 0; k < slope.cols(); ++k)
+            slope(rotor, k) = run.d_parameter_N[static_cast<std::size_t>(k)][static_cast<std::size_t>(rotor)];
+        return slope;
+      }));
+}
+
 /// An instrument's own error is the same in every run, so that repeats do not show it: C_T changes by
 /// `relative` of itself, U not.
 void add_instrument(double Budget::*share, double relative, const Grouping& grouping,
@@ -237,9 +253,10 @@ void add_instruments(const CampaignData& data, const Grouping& grouping, const R
                    sources);
   else
     left_out("temperature", "air_temperature_K");
-  if (!reduction.terms.air_pressure) return;
+  const double exponent = reduction.terms.air_pressure ? 1 : reduction.model.pressure_exponent;
+  if (exponent == 0) return;
   if (declared.air_pressure_Pa)
-    add_instrument(&Budget::pressure, *declared.air_pressure_Pa / 101325, grouping, c_t, sources);
+    add_instrument(&Budget::pressure, exponent * *declared.air_pressure_Pa / 101325, grouping, c_t, sources);
   else
     left_out("pressure", "air_pressure_Pa");
 }
@@ -310,6 +327,7 @@ Summary summarize_locations(const CampaignData& data, const Reduction& reduction
   add_calibration(data, grouping, reduction, sources);
   add_propellers(data, grouping, reduction, sources);
   add_tares(data, grouping, reduction, sources);
+  add_model(data, grouping, reduction, sources);
   add_instruments(data, grouping, reduction, c_t_scatter.means.mean, sources, summary.notes);
 
   summary.locations = grouping.locations;

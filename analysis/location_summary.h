@@ -32,6 +32,7 @@ struct Budget {
   double speed = 0;        // of the tachometer; shared
   double temperature = 0;  // of the thermometer; shared
   double pressure = 0;     // of the barometer, where it enters the model; shared
+  double model = 0;        // of the adopted effects' parameters; shared
 };
 
 struct LocationSummary {

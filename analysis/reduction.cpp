@@ -56,8 +56,7 @@ bool set_conditions(const Run& run, const CampaignInfo& info, const ModelTerms& 
 }
 
 void read_thrusts_from_volts(const CampaignData& data, const Run& run, const RunStatistics& statistics,
-                             const Certificate& certificate, const Tares& tares, RunCoefficients& result,
-                             std::array<double, kMaxRotors>& standard_error_N) {
+                             const Certificate& certificate, const Tares& tares, RunCoefficients& result) {
   const double frames = static_cast<double>(statistics.frames);
   result.tare = tares.zero_at(run.session, run.start_s + 0.5 * frames / data.info.daq.sample_rate_hz);
   for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
@@ -70,34 +69,12 @@ void read_thrusts_from_volts(const CampaignData& data, const Run& run, const Run
     result.d_zero_N_per_V[i] = force.d_zero_N_per_V / k;
     result.d_gain_N2_per_V[i] = force.d_gain_N2_per_V / k;
     result.d_tare_N_per_V[i] = force.d_tare_N_per_V / k;
-    standard_error_N[i] = std::abs(force.d_voltage_N_per_V) * channel.standard_error_V / k;
+    result.thrust_standard_error_N[i] = std::abs(force.d_voltage_N_per_V) * channel.standard_error_V / k;
     result.zero_from_calibration |= force.zero_from_calibration;
     result.extrapolated |= force.extrapolated;
     result.stationary &= channel.stationary();
     result.clipped += channel.clipped;
   }
-}
-
-void set_coefficients(const CampaignInfo& info, const std::array<double, kMaxRotors>& standard_error_N,
-                      RunCoefficients& result) {
-  double uneven_N = 0;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(info.rig.rotors); ++i) {
-    result.total_N += result.thrust_N[i];
-    uneven_N += kSide[i] * result.thrust_N[i];
-  }
-  result.c_t =
-      result.total_N / thesis_reference_thrust_N(result.density_kg_m3, result.speed_rpm, info.rig);  // (4.18)
-  result.u_percent = info.rig.rotors == kMaxRotors ? 100 * uneven_N / result.total_N
-                                                   : std::numeric_limits<double>::quiet_NaN();  // (5.1)
-  const auto c_t_slope = c_t_per_thrust(result, info.rig);
-  const auto u_slope = u_per_thrust(result);
-  double c_t_variance = 0, u_variance = 0;
-  for (std::size_t i = 0; i < standard_error_N.size(); ++i) {
-    c_t_variance += std::pow(c_t_slope[i] * standard_error_N[i], 2);
-    u_variance += std::pow(u_slope[i] * standard_error_N[i], 2);
-  }
-  result.c_t_standard_error = std::sqrt(c_t_variance);
-  result.u_standard_error = std::sqrt(u_variance);
 }
 
 /// Why a run with raw data cannot be reduced; empty where it can.
@@ -161,6 +138,33 @@ std::array<double, kMaxRotors> u_per_thrust(const RunCoefficients& run) {
   return slope;
 }
 
+void set_coefficients(const CampaignInfo& info, RunCoefficients& result) {
+  double uneven_N = 0;
+  result.total_N = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(info.rig.rotors); ++i) {
+    result.total_N += result.thrust_N[i];
+    uneven_N += kSide[i] * result.thrust_N[i];
+  }
+  result.c_t =
+      result.total_N / thesis_reference_thrust_N(result.density_kg_m3, result.speed_rpm, info.rig);  // (4.18)
+  result.u_percent = info.rig.rotors == kMaxRotors ? 100 * uneven_N / result.total_N
+                                                   : std::numeric_limits<double>::quiet_NaN();  // (5.1)
+  const auto c_t_slope = c_t_per_thrust(result, info.rig);
+  const auto u_slope = u_per_thrust(result);
+  double c_t_variance = 0, u_variance = 0;
+  for (std::size_t i = 0; i < result.thrust_standard_error_N.size(); ++i) {
+    c_t_variance += std::pow(c_t_slope[i] * result.thrust_standard_error_N[i], 2);
+    u_variance += std::pow(u_slope[i] * result.thrust_standard_error_N[i], 2);
+  }
+  result.c_t_standard_error = std::sqrt(c_t_variance);
+  result.u_standard_error = std::sqrt(u_variance);
+}
+
+std::string Reduction::model_name() const {
+  if (model.version == 0) return terms.name();
+  return fmt::format("version {} ({})", model.version, fmt::join(model.effects, ", "));
+}
+
 Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms) {
   Reduction reduction;
   reduction.terms = terms;
@@ -170,7 +174,6 @@ Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms) {
     if (run.kind == RunKind::kTare) continue;
     RunCoefficients result;
     result.run = r;
-    std::array<double, kMaxRotors> standard_error_N{};
     if (!set_conditions(run, data.info, terms, result)) {
       reduction.left_out.push_back({run.run, "air_temperature_C was not recorded, so there is no density"});
       continue;
@@ -187,7 +190,7 @@ Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms) {
       if (!data.certificate)
         throw InputError("there is no calibration yet: `tunnelrig calibrate` comes before this");
       read_thrusts_from_volts(data, run, data.statistics.at(run.run), *data.certificate, reduction.tares,
-                              result, standard_error_N);
+                              result);
     } else if (run.thrust_N[0]) {
       for (std::size_t i = 0; i < static_cast<std::size_t>(data.info.rig.rotors); ++i)
         result.thrust_N[i] = run.thrust_N[i].value_or(0);
@@ -195,7 +198,7 @@ Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms) {
       reduction.left_out.push_back({run.run, "it has no raw data and no thrusts"});
       continue;
     }
-    set_coefficients(data.info, standard_error_N, result);
+    set_coefficients(data.info, result);
     if (!(result.total_N > 0)) {
       reduction.left_out.push_back(
           {run.run, fmt::format("its total thrust is {:.3g} N: were the motors running?", result.total_N)});

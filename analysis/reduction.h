@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Core>
+
 namespace tunnelrig {
 
 /// Measured conditions that enter the model beyond the thesis's: each only where it is switched on by name.
@@ -38,9 +40,11 @@ struct RunCoefficients {
   double temperature_K = 0;
   double c_t_standard_error = 0;  // of the run's noise alone
   double u_standard_error = 0;
+  std::array<double, kMaxRotors> thrust_standard_error_N{};  // likewise
 
   // how each corrected thrust depends on what is shared between runs
   std::array<double, kMaxRotors> d_zero_N_per_V{}, d_gain_N2_per_V{}, d_tare_N_per_V{};
+  std::vector<std::array<double, kMaxRotors>> d_parameter_N;  // by the adopted model's parameters
   std::optional<TareZero> tare;
 
   bool zero_from_calibration = false;
@@ -54,16 +58,33 @@ struct LeftOutRun {
   bool problem = true;  // false: nothing that needs mending (a partial recording)
 };
 
+/// The version of the model that the thrusts were corrected by; version 0 is the thesis's, without
+/// correction.
+struct AppliedModel {
+  int version = 0;
+  std::vector<std::string> effects;  // in words
+  Eigen::MatrixXd covariance;        // of its parameters
+  double dof = std::numeric_limits<double>::infinity();
+  double pressure_exponent = 0;  // C_T is corrected by p to this power
+};
+
 struct Reduction {
   ModelTerms terms;
+  AppliedModel model;
   std::vector<RunCoefficients> runs;
   std::vector<LeftOutRun> left_out;
   Tares tares{{}};
+
+  /// "thesis", "air_pressure+rotor_speed", or "version 2 (creep of rotor 1)".
+  std::string model_name() const;
 };
 
 /// Reduces every thrust run that can be; the others are left out by name. Throws InputError where no run can
 /// be, where raw runs have no calibration, and where a switched-on term lacks its measurement in some run.
 Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms);
+
+/// Total, C_T and U with their errors, from the thrusts.
+void set_coefficients(const CampaignInfo& info, RunCoefficients& run);
 
 /// ∂C_T/∂T_i and ∂U/∂T_i of a run.
 std::array<double, kMaxRotors> c_t_per_thrust(const RunCoefficients& run, const Rig& rig);

@@ -32,7 +32,13 @@ constexpr BudgetPart kBudget[] = {{"run", &Budget::run},
                                   {"tare", &Budget::tare},
                                   {"speed", &Budget::speed},
                                   {"temperature", &Budget::temperature},
-                                  {"pressure", &Budget::pressure}};
+                                  {"pressure", &Budget::pressure},
+                                  {"model", &Budget::model}};
+
+/// The model in a cell, without commas: "thesis", "air_pressure+rotor_speed", "2".
+std::string csv_model(const Reduction& reduction) {
+  return reduction.model.version == 0 ? reduction.terms.name() : fmt::format("{}", reduction.model.version);
+}
 
 Json value_json(const LocationValue& value, double factor) {
   return {{"mean", factor * value.mean},
@@ -57,7 +63,8 @@ Json location_json(const LocationSummary& location, double factor, bool has_u) {
 
 }  // namespace
 
-std::string locations_csv(const Summary& summary, const Rig& rig, Convention convention) {
+std::string locations_csv(const Summary& summary, const Reduction& reduction, const Rig& rig,
+                          Convention convention) {
   const double factor = convert_coefficient(1, Convention::kThesis, convention, rig);
   const bool has_u = rig.rotors == kMaxRotors;
   std::string csv =
@@ -66,7 +73,7 @@ std::string locations_csv(const Summary& summary, const Rig& rig, Convention con
   for (int rotor = 1; rotor <= rig.rotors; ++rotor) csv += fmt::format(",c_rotor_{}", rotor);
   csv += ",c_t_dof";
   for (const BudgetPart& part : kBudget) csv += fmt::format(",c_t_u_{}", part.name);
-  csv += ",convention\n";
+  csv += ",convention,model\n";
   for (const LocationSummary& location : summary.locations) {
     const auto u_cell = [&](double value) { return has_u ? cell(value, "{:.6f}") : std::string(); };
     csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", location.label, cell(location.y_norm),
@@ -78,7 +85,7 @@ std::string locations_csv(const Summary& summary, const Rig& rig, Convention con
     csv += "," + cell(location.c_t.dof, "{:.1f}");
     for (const BudgetPart& part : kBudget)
       csv += "," + cell(factor * (location.budget.*part.value), "{:.4g}");
-    csv += fmt::format(",{}\n", name_of(convention));
+    csv += fmt::format(",{},{}\n", name_of(convention), csv_model(reduction));
   }
   return csv;
 }
@@ -87,7 +94,7 @@ std::string runs_csv(const CampaignData& data, const Reduction& reduction, Conve
   const double factor = convert_coefficient(1, Convention::kThesis, convention, data.info.rig);
   std::string csv = "run,location,repeat,session,start_utc,c_t,u_percent,density_kg_m3,speed_rpm";
   for (int rotor = 1; rotor <= data.info.rig.rotors; ++rotor) csv += fmt::format(",thrust_{}_N", rotor);
-  csv += ",c_t_standard_error,stationary,clipped,zero_from_calibration,convention\n";
+  csv += ",c_t_standard_error,stationary,clipped,zero_from_calibration,convention,model\n";
   for (const RunCoefficients& reduced : reduction.runs) {
     const Run& run = data.runs[reduced.run];
     csv += fmt::format("{},{},{},{},{},{},{},{:.6f},{:.1f}", run.run, run.location, run.repeat, run.session,
@@ -96,9 +103,9 @@ std::string runs_csv(const CampaignData& data, const Reduction& reduction, Conve
     for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
       csv += fmt::format(",{:.6f}", reduced.thrust_N[static_cast<std::size_t>(rotor)]);
     }
-    csv += fmt::format(",{},{},{},{},{}\n", cell(factor * reduced.c_t_standard_error, "{:.4g}"),
+    csv += fmt::format(",{},{},{},{},{},{}\n", cell(factor * reduced.c_t_standard_error, "{:.4g}"),
                        reduced.stationary ? 1 : 0, reduced.clipped, reduced.zero_from_calibration ? 1 : 0,
-                       name_of(convention));
+                       name_of(convention), csv_model(reduction));
   }
   return csv;
 }
@@ -106,9 +113,10 @@ std::string runs_csv(const CampaignData& data, const Reduction& reduction, Conve
 std::string reduction_json(const CampaignData& data, const Reduction& reduction, const Summary& summary,
                            Convention convention) {
   const double factor = convert_coefficient(1, Convention::kThesis, convention, data.info.rig);
-  Json json{{"format", "tunnelrig-reduction/1"},  {"campaign", data.info.name},
-            {"model", reduction.terms.name()},    {"convention", name_of(convention)},
-            {"calibration", data.certificate_id}, {"runs", reduction.runs.size()}};
+  Json json{{"format", "tunnelrig-reduction/1"}, {"campaign", data.info.name},
+            {"model", reduction.model_name()},   {"model_version", reduction.model.version},
+            {"convention", name_of(convention)}, {"calibration", data.certificate_id},
+            {"runs", reduction.runs.size()}};
   json["locations"] = Json::array();
   for (const LocationSummary& location : summary.locations) {
     json["locations"].push_back(location_json(location, factor, data.info.rig.rotors == kMaxRotors));

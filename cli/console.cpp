@@ -1,6 +1,7 @@
 #include "cli/console.h"
 
 #include "cli/version.h"
+#include "datasets/campaign.h"
 
 #include <algorithm>
 #include <cctype>
@@ -47,6 +48,11 @@ void remember_arguments(int argc, const char* const* argv) {
 }
 
 const std::string& arguments() { return command_line; }
+
+std::string now_utc() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return format_utc(static_cast<double>(std::chrono::duration_cast<std::chrono::seconds>(now).count()));
+}
 
 bool error_is_terminal() { return ::isatty(STDERR_FILENO) != 0; }
 bool input_is_terminal() { return ::isatty(STDIN_FILENO) != 0; }

@@ -17,6 +17,9 @@ std::string program_version();
 void remember_arguments(int argc, const char* const* argv);
 const std::string& arguments();
 
+/// "2026-03-02T08:00:00Z": when a page was made.
+std::string now_utc();
+
 bool error_is_terminal();
 bool input_is_terminal();
 

@@ -1,9 +1,13 @@
 // tunnelrig explain: find the residual, trace it to the effect that the model lacks, add it, report before
 // and after.
+#include "analysis/effects/expression_effect.h"
+#include "analysis/model/adopt.h"
+#include "analysis/model/model_store.h"
 #include "analysis/residual/explanation_output.h"
 #include "cli/console.h"
 #include "cli/verb.h"
 #include "datasets/error.h"
+#include "datasets/observations.h"
 
 #include <memory>
 
@@ -14,44 +18,80 @@ namespace tunnelrig::cli {
 namespace {
 
 struct Options {
-  std::string db, response, baseline, json, html;
+  std::string db, response, baseline, json, html, effects;
   SearchSettings search;
-  bool list = false, adopt = false;
+  bool list = false, adopt = false, adopt_empirical = false;
 };
 
-std::vector<const Effect*> candidates() {
-  std::vector<const Effect*> result;
-  for (const Effect& effect : all_effects()) result.push_back(&effect);
-  return result;
-}
+/// The program's effects, and the user's own.
+struct Candidates {
+  std::vector<Effect> own;
+  std::vector<const Effect*> all;
+
+  explicit Candidates(const std::string& file) {
+    if (!file.empty()) own = read_effects_toml(file);
+    for (const Effect& effect : all_effects()) all.push_back(&effect);
+    for (const Effect& effect : own) all.push_back(&effect);
+  }
+};
 
 Observations observations_of_file(const Options& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
+  if (file.text("table.toml"))
+    return observe_table(observations_of(file), {options.response, options.baseline});
   CampaignData data = read_campaign_data(file);
   read_run_windows(file, data);
   return observe_campaign(data, {options.response, options.baseline});
 }
 
 int list(const Options& options) {
+  const Candidates candidates(options.effects);
   std::optional<Observations> observations;
   if (!options.db.empty()) observations = observations_of_file(options);
   const Observations* given = observations ? &*observations : nullptr;
-  fmt::print("{}\n", options.json.empty() ? candidates_text(candidates(), given)
-                                          : candidates_json(candidates(), given));
+  fmt::print("{}\n", options.json.empty() ? candidates_text(candidates.all, given)
+                                          : candidates_json(candidates.all, given));
   return kWell;
+}
+
+/// Stores what was accepted as the next version of the model, and says so.
+void adopt_and_store(const Options& options, const Observations& observations,
+                     const Explanation& explanation) {
+  Adoption adoption = adopt(observations, explanation, options.adopt_empirical);
+  for (const std::string& note : adoption.notes) warn(note);
+  if (!adoption.model) {
+    fmt::print(stderr, "nothing was adopted: the model stays as it is\n");
+    return;
+  }
+  CampaignFile file(options.db, CampaignFile::Access::kWrite);
+  const auto certificate = file.newest_document("calibration");
+  const nlohmann::json inputs{{"calibration", certificate ? certificate->id : 0}};
+  adoption.model->version =
+      store_model(file, *adoption.model, {program_version(), arguments(), inputs.dump()});
+  fmt::print(stderr, "stored as model {}; reduce, map and report go by it from now on\n",
+             adoption.model->name());
 }
 
 int run(Options options) {
   if (options.list) return list(options);
   if (options.db.empty()) throw InputError("--db is required (all but --list need a campaign)");
+  if ((options.adopt || options.adopt_empirical) && !options.effects.empty())
+    throw InputError(
+        "--adopt stores effects that the program has: add your own as a file first (docs/effects.md)");
+  const Candidates candidates(options.effects);
   const Observations observations = observations_of_file(options);
+  const std::vector<Effect> axes = effects_of_other_axes(observations);
+  std::vector<const Effect*> effects = candidates.all;
+  for (const Effect& axis : axes) effects.push_back(&axis);
+  const bool adopting = options.adopt || options.adopt_empirical;
+  if (adopting) require_adoptable(observations);
   ProgressBar progress("explaining");
   double step = 0;
   options.search.progress = [&](const std::string& what) {
     step += 1;
     progress.show(step, step + 3, what);
   };
-  const Explanation explanation = explain(observations, candidates(), options.search);
+  const Explanation explanation = explain(observations, effects, options.search);
   for (const std::string& warning : explanation.warnings) warn(warning);
   const std::string json = explanation_json(explanation);
   if (options.json == "-")
@@ -59,6 +99,10 @@ int run(Options options) {
   else
     fmt::print("{}", explanation_text(explanation));
   if (!options.json.empty() && options.json != "-") write_text(options.json, json + "\n");
+  if (!options.html.empty())
+    write_text(options.html, explanation_html(explanation, observations, options.search,
+                                              {options.db, program_version(), arguments(), now_utc()}));
+  if (adopting) adopt_and_store(options, observations, explanation);
   return kWell;
 }
 
@@ -89,9 +133,14 @@ void add_explain(CLI::App& app, Work& work) {
   verb->add_option("--json", options->json,
                    "Write the explanation as JSON to this file (- for standard output)");
   verb->add_option("--html", options->html, "Write a page with the pictures");
+  verb->add_option("--effects", options->effects,
+                   "Candidates of your own as expressions (.toml; docs/effects.md)")
+      ->option_text("FILE");
   verb->add_flag("--list", options->list,
                  "Print the candidates, and with --db whether this data can test them");
   verb->add_flag("--adopt", options->adopt, "Store the accepted effects as the next version of the model");
+  verb->add_flag("--adopt-empirical", options->adopt_empirical,
+                 "Store with them the curves that have no name");
   verb->callback([options, &work] { work = [options] { return run(*options); }; });
 }
 

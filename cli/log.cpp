@@ -176,6 +176,13 @@ class Logging {
     fmt::print("{}  {} {} #{}  {}: {} frames, {} lost, {}\n", name, planned.session, planned.location,
                planned.repeat, planned.kind == RunKind::kTare ? "tare" : "thrust", ledger.frames_stored,
                ledger.frames_lost, means);
+    if (outcome.clock && !virtual_) {
+      fmt::print(
+          "      board clock: {:.5f} ± {:.5f} frames/s by this computer's clock over {}, drift {:+.2f} ± "
+          "{:.2f} ppm/h\n",
+          outcome.clock->rate_hz, outcome.clock->rate_interval_hz, duration_text(outcome.clock->span_s),
+          outcome.clock->drift_ppm_h, outcome.clock->drift_interval_ppm_h);
+    }
     std::fflush(stdout);
     bool problem = outcome.state != RunState::kComplete;
     if (problem) warn(fmt::format("run {} is partial: {}", name, ledger.end_reason));
@@ -292,7 +299,9 @@ void add_log(CLI::App& app, Work& work) {
       "One run, or a plan of them; a plan resumes where it stopped. Ctrl-C ends the run and keeps what was "
       "recorded.\n"
       "Without --source the virtual rig is recorded: simulated, and marked so in the column `source`.\n\n"
-      "Examples: tunnelrig log --db my.db --location H4V-2 --repeat 3 --session S2 --source "
+      "Examples: tunnelrig log --db my.db --location H4V-2 --repeat 3 --session S2 --source usb "
+      "--temperature-C 21.3\n"
+      "          tunnelrig log --db my.db --location H4V-2 --repeat 3 --session S2 --source "
       "serial:/dev/ttyUSB0 --temperature-C 21.3\n"
       "          tunnelrig log --db my.db --location OT --session S2 --kind tare --source "
       "tcp:rig.local:4000\n"
@@ -305,7 +314,9 @@ void add_log(CLI::App& app, Work& work) {
   verb->add_option("--kind", options->kind, "tare: motors stopped")
       ->check(CLI::IsMember({"thrust", "tare"}))
       ->capture_default_str();
-  verb->add_option("--source", options->source, "virtual, tcp:HOST:PORT, serial:DEVICE[@BAUD] or replay:FILE")
+  verb->add_option("--source", options->source,
+                   "virtual, usb[:SERIAL][,test-pattern][,rate=4000/3][,oversampling=8], tcp:HOST:PORT, "
+                   "serial:DEVICE[@BAUD] or replay:FILE")
       ->capture_default_str();
   verb->add_option("--plan", options->plan, "CSV of runs to record, one after the other (`tunnelrig plan`)");
   verb->add_flag("--yes", options->yes, "Do not ask between locations");

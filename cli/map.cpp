@@ -1,4 +1,5 @@
 #include "analysis/maps/write_maps.h"
+#include "analysis/model/model_store.h"
 #include "analysis/reduction_output.h"
 #include "cli/console.h"
 #include "cli/verb.h"
@@ -13,7 +14,7 @@ namespace tunnelrig::cli {
 namespace {
 
 struct Options {
-  std::string db, out, method = "gaussian-process", terms = "thesis";
+  std::string db, out, method = "gaussian-process", model, terms;
   int nodes = 41;
   bool json = false;
 };
@@ -49,7 +50,7 @@ void print(const WrittenMaps& written) {
 int run(const Options& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   const CampaignData data = read_campaign_data(file);
-  const Reduction reduction = reduce_runs(data, terms_from_names(options.terms));
+  const Reduction reduction = reduce_by(data, choose_model(file, options.model, options.terms));
   const Summary summary = summarize_locations(data, reduction);
   const TunnelMaps maps =
       fit_maps(map_input(data, summary, options.db), {.method = map_method(options.method)});
@@ -57,19 +58,21 @@ int run(const Options& options) {
                                   {"arguments", arguments()},
                                   {"campaign", data.info.name},
                                   {"calibration", data.certificate_id},
-                                  {"model", reduction.terms.name()},
+                                  {"model", reduction.model_name()},
                                   {"runs", reduction.runs.size()}};
   const WrittenMaps written =
       write_maps(options.out, maps, {.nodes = options.nodes, .provenance = provenance.dump()});
   CampaignFile(options.db, CampaignFile::Access::kWrite)
       .add_document(
           "map",
-          {program_version(), arguments(), nlohmann::json{{"calibration", data.certificate_id}}.dump()},
+          {program_version(), arguments(),
+           nlohmann::json{{"calibration", data.certificate_id}, {"model", reduction.model.version}}.dump()},
           format_disturbance_map(written.map));
   if (written.warning) warn(*written.warning);
   if (options.json) {
     nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},
                                 {"method", written.map.method},
+                                {"model", reduction.model_name()},
                                 {"locations", written.map.locations.size()},
                                 {"delta_ct", fit_json(written.map.delta_ct_fit)},
                                 {"uneven_thrust", fit_json(written.map.uneven_thrust_fit)}};
@@ -77,6 +80,7 @@ int run(const Options& options) {
     fmt::print("{}\n", json.dump(1));
   } else {
     print(written);
+    fmt::print("model {}\n", reduction.model_name());
   }
   return kWell;
 }
@@ -95,8 +99,7 @@ void add_map(CLI::App& app, Work& work) {
   verb->add_option("--method", options->method, "gaussian-process or thin-plate-spline")
       ->capture_default_str();
   verb->add_option("--nodes", options->nodes, "Of the grid along each side, odd")->capture_default_str();
-  verb->add_option("--with", options->terms, "Measured conditions that enter the model, as in reduce")
-      ->capture_default_str();
+  add_model_options(*verb, options->model, options->terms);
   verb->add_flag("--json", options->json, "Print the summary as JSON");
   verb->callback([options, &work] { work = [options] { return run(*options); }; });
 }

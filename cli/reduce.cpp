@@ -1,3 +1,4 @@
+#include "analysis/model/model_store.h"
 #include "analysis/reduction_output.h"
 #include "analysis/table_reduction.h"
 #include "cli/console.h"
@@ -17,13 +18,14 @@ namespace tunnelrig::cli {
 namespace {
 
 struct Options {
-  std::string db, csv, runs_csv, plot, convention, terms = "thesis";
+  std::string db, csv, runs_csv, plot, convention, model, terms;
   bool from_raw = false, no_spectra = false, json = false;
 };
 
-std::string inputs_json(const CampaignData& data) {
+std::string inputs_json(const CampaignData& data, const Reduction& reduction) {
   return nlohmann::json{{"calibration", data.certificate_id},
-                        {"points", data.certificate ? data.certificate->points_hash : ""}}
+                        {"points", data.certificate ? data.certificate->points_hash : ""},
+                        {"model", reduction.model.version}}
       .dump();
 }
 
@@ -69,7 +71,7 @@ void print_summary(const CampaignData& data, const Reduction& reduction, const S
   }
   table.print();
   fmt::print("\n{} runs at {} locations; model {}, convention {}\n", reduction.runs.size(),
-             summary.locations.size(), reduction.terms.name(), name_of(convention));
+             summary.locations.size(), reduction.model_name(), name_of(convention));
   for (const std::string& note : summary.notes) fmt::print("note: {}\n", note);
 }
 
@@ -102,14 +104,15 @@ int reduce_campaign(const Options& options, const CampaignFile& file) {
   const bool agreed = !options.from_raw || refresh_from_raw(options, data);
   const Convention convention =
       convention_from_name(options.convention.empty() ? "thesis" : options.convention);
-  const Reduction reduction = reduce_runs(data, terms_from_names(options.terms));
+  const Reduction reduction = reduce_by(data, choose_model(file, options.model, options.terms));
   const Summary summary = summarize_locations(data, reduction);
   const bool problem = warn_of_left_out(data, reduction);
   const std::string json = reduction_json(data, reduction, summary, convention);
-  if (!options.csv.empty()) write_text(options.csv, locations_csv(summary, data.info.rig, convention));
+  if (!options.csv.empty())
+    write_text(options.csv, locations_csv(summary, reduction, data.info.rig, convention));
   if (!options.runs_csv.empty()) write_text(options.runs_csv, runs_csv(data, reduction, convention));
   CampaignFile(options.db, CampaignFile::Access::kWrite)
-      .add_document("reduction", {program_version(), arguments(), inputs_json(data)}, json);
+      .add_document("reduction", {program_version(), arguments(), inputs_json(data, reduction)}, json);
   if (options.json)
     fmt::print("{}\n", json);
   else
@@ -118,6 +121,8 @@ int reduce_campaign(const Options& options, const CampaignFile& file) {
 }
 
 int reduce_table(const Options& options, const CampaignFile& file) {
+  if (!options.model.empty() && options.model != "thesis")
+    throw InputError(fmt::format("--model {}: a table is reduced as it is, without a model", options.model));
   const Convention convention =
       convention_from_name(options.convention.empty() ? "propeller" : options.convention);
   const TableReduction reduction = reduce_table_rows(observations_of(file), convention);
@@ -179,14 +184,11 @@ void add_reduce(CLI::App& app, Work& work) {
       "U95 is the expanded uncertainty (95 %); docs/reduction.md has its budget. A table of observations is "
       "reduced to C_T per row.\n\n"
       "Examples: tunnelrig reduce --db my.db --csv coefficients.csv\n"
-      "          tunnelrig reduce --db my.db --with air_pressure,rotor_speed --json");
+      "          tunnelrig reduce --db my.db --model thesis --with air_pressure,rotor_speed --json");
   verb->add_option("--db", options->db, "Campaign file")->required();
   verb->add_option("--csv", options->csv, "Write one row per location (of a table: per observation)");
   verb->add_option("--runs-csv", options->runs_csv, "Write one row per run");
-  verb->add_option(
-          "--with", options->terms,
-          "Measured conditions that enter the model: air_pressure, air_humidity, rotor_speed; thesis: none")
-      ->capture_default_str();
+  add_model_options(*verb, options->model, options->terms);
   verb->add_option("--convention", options->convention,
                    "Of C_T: thesis, helicopter or propeller (thesis; of a table: propeller)");
   verb->add_option("--plot", options->plot, "Of a table: draw C_T against speed (.svg or .png)");

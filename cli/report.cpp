@@ -4,7 +4,6 @@
 #include "cli/verb.h"
 #include "datasets/csv.h"
 
-#include <chrono>
 #include <memory>
 
 #include <fmt/format.h>
@@ -13,13 +12,8 @@ namespace tunnelrig::cli {
 namespace {
 
 struct Options {
-  std::string db, out, terms = "thesis";
+  std::string db, out, model, terms;
 };
-
-std::string now_utc() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return format_utc(static_cast<double>(std::chrono::duration_cast<std::chrono::seconds>(now).count()));
-}
 
 int run(const Options& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
@@ -27,7 +21,7 @@ int run(const Options& options) {
                                 .program_version = program_version(),
                                 .arguments = arguments(),
                                 .created_utc = now_utc(),
-                                .terms = terms_from_names(options.terms)};
+                                .model = choose_model(file, options.model, options.terms)};
   ProgressBar bar("report");
   const ReportData data = report_data(file, settings, [&bar](std::size_t done, std::size_t total) {
     bar.show(static_cast<double>(done), static_cast<double>(total), fmt::format("run {} of {}", done, total));
@@ -53,8 +47,7 @@ void add_report(CLI::App& app, Work& work) {
       "Example: tunnelrig report --db my.db --out report.html");
   verb->add_option("--db", options->db, "Campaign file")->required();
   verb->add_option("--out", options->out, "The page (.html)")->required();
-  verb->add_option("--with", options->terms, "Measured conditions that enter the model, as in reduce")
-      ->capture_default_str();
+  add_model_options(*verb, options->model, options->terms);
   verb->callback([options, &work] { work = [options] { return run(*options); }; });
 }
 

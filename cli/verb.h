@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include <CLI/CLI.hpp>
 
@@ -20,6 +21,11 @@ void add_map(CLI::App& app, Work& run);
 void add_report(CLI::App& app, Work& run);
 void add_explain(CLI::App& app, Work& run);
 void add_fly(CLI::App& app, Work& run);
+void add_models(CLI::App& app, Work& run);
 void add_doctor(CLI::App& app, Work& run);
+void add_devices(CLI::App& app, Work& run);
+
+/// --model and --with, as every verb that reduces has them.
+void add_model_options(CLI::App& verb, std::string& model, std::string& terms);
 
 }  // namespace tunnelrig::cli

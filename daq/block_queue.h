@@ -18,6 +18,7 @@ struct Block {
   ReadResult::Status status = ReadResult::Status::kNothing;
   double time_s = 0;
   std::vector<std::byte> bytes;
+  const char* cause = nullptr;
 };
 
 /// A queue of blocks, bounded by their bytes. A recorder that is held up (a disk that syncs slowly) does not

@@ -44,6 +44,7 @@ class Reader {
 
  private:
   void run() {
+    source_.begin_run();
     std::vector<std::byte> buffer(kReadSize);
     ReadResult result;
     do {
@@ -53,7 +54,8 @@ class Reader {
         std::this_thread::sleep_for(kReopenPause);
     } while (queue_.push({result.status,
                           result.time_s,
-                          {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(result.size)}}) &&
+                          {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(result.size)},
+                          result.cause}) &&
              result.status != ReadResult::Status::kEnd);
   }
 
@@ -103,12 +105,20 @@ class RunSink : public FrameSink {
 class TrackerSink : public PacketSink {
  public:
   TrackerSink(LossTracker& tracker, FrameSink& sink) : tracker_(tracker), sink_(sink) {}
-  void packet(const Packet& packet) override { tracker_.take(packet, time_s_, sink_); }
+  void packet(const Packet& packet) override {
+    const trw_header& header = packet.header;
+    clock_.add(header.boot_id,
+               header.first_ticks + (header.frame_count - std::uint64_t{1}) * header.ticks_per_frame,
+               header.tick_hz, header.ticks_per_frame, time_s_);
+    tracker_.take(packet, time_s_, sink_);
+  }
+  const ClockFit& clock() const { return clock_; }
   void set_time(double time_s) { time_s_ = time_s; }
 
  private:
   LossTracker& tracker_;
   FrameSink& sink_;
+  ClockFit clock_;
   double time_s_ = 0;
 };
 
@@ -186,7 +196,14 @@ class Recording {
     LogOutcome outcome;
     outcome.state = end_reason.empty() ? RunState::kComplete : RunState::kPartial;
     end_reason_ = end_reason.empty() ? "complete" : end_reason;
+    outcome.clock = packets_.clock().estimate();
     outcome.ledger = ledger();
+    if (outcome.clock) {  // measured, not what it is meant to be
+      outcome.ledger.board_rate_hz = outcome.clock->rate_hz;
+      outcome.ledger.rate_interval_hz = outcome.clock->rate_interval_hz;
+      outcome.ledger.drift_ppm_h = outcome.clock->drift_ppm_h;
+      outcome.ledger.drift_interval_ppm_h = outcome.clock->drift_interval_ppm_h;
+    }
     const std::string hash = writer_.finish(outcome.state, outcome.ledger);
     outcome.statistics = summarizer.finish(hash);
     return outcome;
@@ -208,6 +225,7 @@ class Recording {
   /// The reason to end, or nothing.
   std::string take(const Block& block, Reader& reader) {
     packets_.set_time(block.time_s);
+    if (block.cause != nullptr) tracker_.note_cause(block.cause);
     decoder_.push(block.bytes, packets_);
     if (block.status == ReadResult::Status::kEnd) {
       decoder_.finish(packets_);

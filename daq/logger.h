@@ -1,6 +1,7 @@
 // One run from a source into the campaign file: read, decode, account, store, sum up.
 #pragma once
 
+#include "daq/clock_fit.h"
 #include "daq/packet_source.h"
 #include "datasets/campaign_file.h"
 #include "datasets/raw_store.h"
@@ -11,6 +12,7 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,6 +45,7 @@ struct LogOutcome {
   RunState state = RunState::kPartial;
   Ledger ledger;
   RunStatistics statistics;
+  std::optional<ClockEstimate> clock;  // of a source with a clock, from ten seconds on
 };
 
 /// A run as it enters the sheet of runs: column and text, "run" among them.

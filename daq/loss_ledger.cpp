@@ -54,7 +54,8 @@ bool LossTracker::follow_boot(const trw_header& header, double time_s, FrameSink
   ++ledger_.reboots;
   const double between = std::round((time_s - last_time_s_) * rate_of(header)) - header.frame_count;
   const auto by_clock = static_cast<std::uint64_t>(std::clamp(between, 0.0, 1e15));
-  lose(std::max({by_clock, header.first_sequence, std::uint64_t{1}}), "reboot", true, sink);
+  lose(std::max({by_clock, header.first_sequence, std::uint64_t{1}}),
+       noted_cause_ != nullptr ? noted_cause_ : "reboot", true, sink);
   next_sequence_ = header.first_sequence;
   lost_ranges_.clear();
   return true;
@@ -85,12 +86,14 @@ void LossTracker::take(const Packet& packet, double time_s, FrameSink& sink) {
     const bool overrun = (status_of(packet, 0) & TRW_STATUS_OVERRUN) != 0;
     lost_ranges_.emplace_back(next_sequence_, first);
     if (lost_ranges_.size() > kRememberedGaps) lost_ranges_.erase(lost_ranges_.begin());
-    lose(first - next_sequence_, overrun ? "overrun" : "lost", false, sink);
+    const char* unknown = noted_cause_ != nullptr ? noted_cause_ : "lost";
+    lose(first - next_sequence_, overrun ? "overrun" : unknown, false, sink);
   }
   if (known < header.frame_count) {
     pass(packet, known, header.frame_count - known, sink);
     next_sequence_ = first + header.frame_count;
     last_time_s_ = time_s;
+    noted_cause_ = nullptr;
   }
 }
 

@@ -26,6 +26,10 @@ class LossTracker {
   /// `sink`.
   void take(const Packet& packet, double time_s, FrameSink& sink);
 
+  /// What the source says went wrong just now: the cause of the next gap, unless the board knows better. A
+  /// static text.
+  void note_cause(const char* cause) { noted_cause_ = cause; }
+
   bool complete() const { return frames_wanted_ != 0 && ledger_.frames_emitted >= frames_wanted_; }
 
   /// The sums so far. The counts that only others know (corrupt packets, silences) are theirs to fill in.
@@ -44,6 +48,7 @@ class LossTracker {
   std::uint32_t boot_id_ = 0;
   std::vector<std::uint32_t> past_boots_;
   std::uint64_t next_sequence_ = 0;
+  const char* noted_cause_ = nullptr;
   double last_time_s_ = 0;
   std::vector<std::pair<std::uint64_t, std::uint64_t>>
       lost_ranges_;                    // [first, end) of this boot, newest last

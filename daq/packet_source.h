@@ -20,12 +20,17 @@ struct ReadResult {
   std::size_t size = 0;
   double time_s =
       0;  // when the bytes (or their absence) were seen, on a clock of the source that never runs backwards
+  const char* cause =
+      nullptr;  // what went wrong before these bytes: a static text for the gap, if there is one
 };
 
 /// A stream of bytes in which packets stand (docs/wire-format.md). Used by one thread at a time.
 class PacketSource {
  public:
   virtual ~PacketSource() = default;
+
+  /// A run begins: what waits from before may be thrown away.
+  virtual void begin_run() {}
 
   /// Waits for bytes, at most for `timeout`. Never throws for what a device or a cable does.
   virtual ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds timeout) = 0;
@@ -38,8 +43,8 @@ class PacketSource {
   virtual std::string name() const = 0;
 };
 
-/// Opens "tcp:HOST:PORT", "serial:DEVICE[@BAUD]" or "replay:FILE". Throws InputError naming the source and
-/// what is wrong with it. (The virtual rig needs more than a name: virtual_rig.h.)
+/// Opens "usb[:SERIAL]", "tcp:HOST:PORT", "serial:DEVICE[@BAUD]" or "replay:FILE". Throws InputError naming
+/// the source and what is wrong with it. (The virtual rig needs more than a name: virtual_rig.h.)
 std::unique_ptr<PacketSource> open_source(const std::string& name);
 
 /// Seconds on the clock of a source that runs in real time.

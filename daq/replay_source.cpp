@@ -50,8 +50,11 @@ std::unique_ptr<PacketSource> open_source(const std::string& name) {
   std::string_view rest = name;
   if (take_prefix(rest, "tcp:")) return open_tcp(name, rest);
   if (take_prefix(rest, "serial:")) return open_serial(name, rest);
+  if (rest == "usb") return open_usb(name, "");
+  if (take_prefix(rest, "usb:")) return open_usb(name, rest);
   if (take_prefix(rest, "replay:")) return open_replay(name, rest);
-  throw InputError::in(name, "is no source; write virtual, tcp:HOST:PORT, serial:DEVICE or replay:FILE");
+  throw InputError::in(
+      name, "is no source; write virtual, usb[:SERIAL], tcp:HOST:PORT, serial:DEVICE or replay:FILE");
 }
 
 double steady_seconds() {

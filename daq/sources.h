@@ -11,6 +11,7 @@ namespace tunnelrig {
 
 std::unique_ptr<PacketSource> open_tcp(const std::string& name, std::string_view address);
 std::unique_ptr<PacketSource> open_serial(const std::string& name, std::string_view device);
+std::unique_ptr<PacketSource> open_usb(const std::string& name, std::string_view board);
 std::unique_ptr<PacketSource> open_replay(const std::string& name, std::string_view file);
 
 }  // namespace tunnelrig

@@ -167,6 +167,12 @@ std::optional<double> converted(const Sheet& sheet, std::size_t row, const Table
     throw InputError(fmt::format("{}: {:g} {} is below absolute zero", sheet.where(row, column.column),
                                  *value, column.unit));
   }
+  const bool air = column.meaning == "air_temperature_C", cell = column.meaning == "cell_temperature_C";
+  if ((air || cell) && (si < -80 || si > (air ? 80 : 200))) {
+    throw InputError(
+        fmt::format("{}: {:g} {} is no temperature of {}; degrees Celsius, kelvin or Fahrenheit?",
+                    sheet.where(row, column.column), *value, column.unit, air ? "air" : "a cell"));
+  }
   return si;
 }
 

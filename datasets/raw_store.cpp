@@ -26,8 +26,9 @@ void write_ledger(const Database& database, std::int64_t raw_run, const Ledger& 
       "INSERT OR REPLACE INTO ledgers (raw_run, frames_emitted, frames_stored, frames_lost, "
       "frames_duplicate, "
       "frames_late, packets_corrupt, bytes_skipped, frames_overrun, frames_adc_error, reboots, silences, "
-      "boot_id, first_sequence, board_rate_hz, end_reason, source) "
-      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
+      "boot_id, first_sequence, board_rate_hz, rate_interval_hz, drift_ppm_h, drift_interval_ppm_h, "
+      "end_reason, source) "
+      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
       .bind(raw_run)
       .bind(as_sql(ledger.frames_emitted))
       .bind(as_sql(ledger.frames_stored))
@@ -43,6 +44,9 @@ void write_ledger(const Database& database, std::int64_t raw_run, const Ledger& 
       .bind(std::int64_t{ledger.boot_id})
       .bind(as_sql(ledger.first_sequence))
       .bind(ledger.board_rate_hz)
+      .bind(ledger.rate_interval_hz)
+      .bind(ledger.drift_ppm_h)
+      .bind(ledger.drift_interval_ppm_h)
       .bind(ledger.end_reason)
       .bind(ledger.source)
       .run();
@@ -216,7 +220,8 @@ std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run) 
       file.database(),
       "SELECT frames_emitted, frames_stored, frames_lost, frames_duplicate, frames_late, packets_corrupt, "
       "bytes_skipped, frames_overrun, frames_adc_error, reboots, silences, boot_id, first_sequence, "
-      "board_rate_hz, end_reason, source FROM ledgers WHERE raw_run = ?");
+      "board_rate_hz, rate_interval_hz, drift_ppm_h, drift_interval_ppm_h, end_reason, source FROM ledgers "
+      "WHERE raw_run = ?");
   select.bind(raw_run);
   if (!select.step()) return {};
   return Ledger{.frames_emitted = from_sql(select.integer(0)),
@@ -233,8 +238,11 @@ std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run) 
                 .boot_id = static_cast<std::uint32_t>(select.integer(11)),
                 .first_sequence = from_sql(select.integer(12)),
                 .board_rate_hz = select.maybe_real(13),
-                .end_reason = select.text(14),
-                .source = select.text(15)};
+                .rate_interval_hz = select.maybe_real(14),
+                .drift_ppm_h = select.maybe_real(15),
+                .drift_interval_ppm_h = select.maybe_real(16),
+                .end_reason = select.text(17),
+                .source = select.text(18)};
 }
 
 void read_raw(const CampaignFile& file, const RawRun& run, FrameSink& sink) {

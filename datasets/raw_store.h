@@ -32,6 +32,7 @@ struct Ledger {
   std::uint32_t boot_id = 0;
   std::uint64_t first_sequence = 0;
   std::optional<double> board_rate_hz;
+  std::optional<double> rate_interval_hz, drift_ppm_h, drift_interval_ppm_h;  // where the rate was fitted
   std::string end_reason;
   std::string source;
 

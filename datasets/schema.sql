@@ -73,7 +73,10 @@ CREATE TABLE ledgers (
   silences          INTEGER NOT NULL,       -- times the source said nothing for a second
   boot_id           INTEGER NOT NULL,       -- of the first frame
   first_sequence    INTEGER NOT NULL,
-  board_rate_hz     REAL,                   -- frames per second by the board's own clock
+  board_rate_hz     REAL,                   -- frames per second: fitted against the computer's clock, or as the board says
+  rate_interval_hz  REAL,                   -- half of the fitted rate's 95 % interval; null where it was not fitted
+  drift_ppm_h       REAL,                   -- change of the fitted rate
+  drift_interval_ppm_h REAL,
   end_reason        TEXT NOT NULL DEFAULT '',
   source            TEXT NOT NULL DEFAULT ''
 );

@@ -13,7 +13,8 @@ double reynolds(std::span<const double> x, const Rig& rig) {
   const double kelvin = x[1] + kZeroCelsius_K;
   const double pressure_Pa = x.size() > 2 ? x[2] : 101325.0;
   const double tip_m_s = x[0] * 2 * std::numbers::pi / 60 * rig.propeller_radius_m;
-  return dry_air_density_kg_m3(pressure_Pa, kelvin) * tip_m_s * rig.blade_chord_m / air_viscosity_Pa_s(kelvin);
+  return dry_air_density_kg_m3(pressure_Pa, kelvin) * tip_m_s * rig.blade_chord_m /
+         air_viscosity_Pa_s(kelvin);
 }
 
 struct ReynoldsNumber {

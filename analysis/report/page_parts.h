@@ -5,9 +5,10 @@
 
 namespace tunnelrig::report {
 
-std::string_view page_template();  // page/report.html
-std::string_view page_style();     // page/report.css
-std::string_view page_script();    // page/*.js, one after the other
+std::string_view page_template();       // page/report.html
+std::string_view page_style();          // page/report.css
+std::string_view page_script();         // page/*.js of the report, one after the other
+std::string_view explanation_script();  // and of the explanation
 std::string_view plotly();
 
 }  // namespace tunnelrig::report

@@ -23,15 +23,10 @@ std::string escaped(std::string_view json) {
   return text;
 }
 
-}  // namespace
-
-std::string render_report(std::string_view json) {
+std::string render(std::string_view json, std::string_view script) {
   const std::string data = escaped(json);
   const std::array<std::pair<std::string_view, std::string_view>, 4> parts = {
-      {{"style", report::page_style()},
-       {"plotly", report::plotly()},
-       {"data", data},
-       {"script", report::page_script()}}};
+      {{"style", report::page_style()}, {"plotly", report::plotly()}, {"data", data}, {"script", script}}};
   std::string page;
   std::string_view rest = report::page_template();
   for (const auto& [name, text] : parts) {  // in the template's order
@@ -43,5 +38,10 @@ std::string render_report(std::string_view json) {
   }
   return page.append(rest);
 }
+
+}  // namespace
+
+std::string render_report(std::string_view json) { return render(json, report::page_script()); }
+std::string render_explanation(std::string_view json) { return render(json, report::explanation_script()); }
 
 }  // namespace tunnelrig

@@ -28,7 +28,7 @@ report::Frames frames_of(const CampaignFile& file, const RawRun& run) {
 /// Reduces and maps as far as the campaign allows, and keeps the reason where it does not.
 void derive(Material& material) {
   try {
-    material.reduction = reduce_runs(material.data, material.settings.terms);
+    material.reduction = reduce_by(material.data, material.settings.model);
     material.summary = summarize_locations(material.data, *material.reduction);
   } catch (const InputError& error) {
     material.reduction.reset();
@@ -106,9 +106,11 @@ ReportData report_data(const CampaignFile& file, const ReportSettings& settings,
                   {"arguments", settings.arguments},
                   {"created_utc", settings.created_utc},
                   {"db", settings.db},
-                  {"model", settings.terms.name()}}}};
+                  {"model", settings.model.name()}}}};
   document.update(file.text("table.toml") ? table_document(file)
                                           : campaign_document(gather(file, settings, progress)));
+  if (Json models = report::model_section(file); !models.empty())
+    document["sections"]["model"] = std::move(models);
   ReportData data;
   for (const auto& [name, section] : document["sections"].items()) {
     if (section.contains("absent")) data.absent.push_back({name, section["absent"].get<std::string>()});

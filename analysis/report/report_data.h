@@ -1,7 +1,7 @@
 // A campaign file as one JSON document: everything that the report's page shows (docs/report.md).
 #pragma once
 
-#include "analysis/reduction.h"
+#include "analysis/model/model_store.h"
 #include "datasets/campaign_file.h"
 
 #include <cstddef>
@@ -16,7 +16,7 @@ struct ReportSettings {
   std::string program_version;  // of the provenance, as the two below
   std::string arguments;
   std::string created_utc;
-  ModelTerms terms;
+  ModelChoice model;
 };
 
 /// A section that a campaign has no data for, with the sentence that stands in its place.

@@ -63,6 +63,10 @@ Json uneven_section(const Material& material);
 Json open_space_section(const Material& material);
 Json budget_section(const Material& material);
 
+/// Every adopted version of the model with the explanation that it comes from, newest first; empty where none
+/// is.
+Json model_section(const CampaignFile& file);
+
 Json calibration_section(const Material& material);
 
 /// A column for each thing that is known of every run, tares and partial ones included.

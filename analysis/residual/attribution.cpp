@@ -1,5 +1,7 @@
 #include "analysis/residual/attribution.h"
 
+#include "calibration/distributions.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -76,7 +78,7 @@ class Search {
       : observations_(observations),
         rows_(rows),
         settings_(settings),
-        mixed_(observations, rows),
+        mixed_(std::make_unique<MixedModel>(observations_, rows)),
         ways_(all_ways(effects, observations, rows)),
         curves_(curves_to_try(observations, rows)),
         y_(response_components(observations)) {
@@ -91,6 +93,7 @@ class Search {
     find_confounded();
     result_.session_unknown = session_scatter_is_large();
     result_.final = fit_;
+    result_.observations = std::move(observations_);
     return std::move(result_);
   }
 
@@ -105,7 +108,8 @@ class Search {
 
   bool already_in(const Term& way) const {
     return std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& accepted) {
-      return accepted.term.effect->name == way.effect->name &&
+      const bool another_axis = way.effect->name == "crosstalk" && accepted.term.effect != way.effect;
+      return !another_axis && accepted.term.effect->name == way.effect->name &&
              (accepted.term.rotor == way.rotor || accepted.term.rotor < 0 || way.rotor < 0) &&
              accepted.term.other == way.other && !way.effect->has_change_point();
     });
@@ -147,17 +151,17 @@ class Search {
   /// What groups' constants absorb cannot be tested.
   bool can_be_seen(const Candidate& candidate) const {
     double before = 0, after = 0;
-    for (std::size_t s = 0; s < mixed_.strata().size(); ++s) {
-      Stacked column = mixed_.stack(s, {&candidate.columns[0]});
+    for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
+      Stacked column = mixed_->stack(s, {&candidate.columns[0]});
       before += column.squaredNorm();
-      mixed_.project(s, 0, column);
+      mixed_->project(s, 0, column);
       after += column.squaredNorm();
     }
     return after > 1e-14 * before && after > 0;
   }
 
   void rank(const JointFit& base, Scan& scan) const {
-    scan.scan = std::make_unique<CandidateScan>(mixed_, base.linear.columns, scan.candidates);
+    scan.scan = std::make_unique<CandidateScan>(*mixed_, base.linear.columns, scan.candidates);
     scan.fits = scan.scan->fit(difference(y_, base.linear.offset));
     scan.order.resize(scan.fits.size());
     std::iota(scan.order.begin(), scan.order.end(), 0U);
@@ -173,6 +177,7 @@ class Search {
     NullMaxima maxima(*scan.scan, fit_.variances, settings_, ++salt_);
     const double p = maxima.p(scan.fits[scan.order[0]].evidence);
     if (p <= settings_.alpha || critical_ == 0) critical_ = maxima.critical();
+    round.observed = scan.fits[scan.order[0]].evidence;
     round.critical = critical_;
     round.ranking = ranking(scan, maxima);
     round.null_maxima = maxima.values();
@@ -234,13 +239,49 @@ class Search {
                                   .confounded = {}});
       fit_ = std::move(fit);
       read_back_terms();
-      round.outcome += "accepted " + term_label(result_.accepted.back());
+      if (observations_.channels() == 1 && observations_.groups() > 1) let_groups_differ();
+      round.outcome += "accepted " + result_.accepted.back().term.label();
       return true;
     }
     return false;
   }
 
-  static std::string term_label(const Accepted& accepted) { return accepted.term.label(); }
+  /// The newest effect with an amplitude of each group's own, where the data ask for it.
+  void let_groups_differ() {
+    const Term shared = result_.accepted.back().term;
+    Term own = shared;
+    own.per_group = true;
+    own.at_theory = false;
+    own.parameters[0] = 0;
+    Observations wider = observations_;
+    const TermResponse response = respond(own, wider, predict_response(wider, fit_.model, rows_));
+    wider.slopes.conservativeResize(Eigen::NoChange, wider.slopes.cols() + 1);
+    wider.slopes.rightCols(1) = response.derivative[0][0];
+    MeanModel model = fit_.model;
+    model.terms.back() = own;
+    JointFit fit = fit_jointly(wider, model, rows_);
+    const auto before = sum_of_squares(observations_, fit_), after = sum_of_squares(wider, fit);
+    const double more = before.second - after.second;
+    if (more <= 0 || after.second <= 0) return;
+    const double f = (before.first - after.first) / more / (after.first / after.second);
+    if (!(f > 0) || f_upper_p(f, more, after.second) > settings_.alpha) return;
+    const LossDifference gain = compare(
+        cross_validate(observations_, difference(y_, fit_.linear.offset), fit_.linear.columns, fit.variances,
+                       rows_),
+        cross_validate(wider, difference(y_, fit.linear.offset), fit.linear.columns, fit.variances, rows_));
+    if (!(gain.mean > gain.standard_error)) return;
+    observations_ = std::move(wider);
+    mixed_ = std::make_unique<MixedModel>(observations_, rows_);
+    fit_ = std::move(fit);
+    read_back_terms();
+  }
+
+  /// Of the runs' means within the fit, and its degrees of freedom.
+  std::pair<double, double> sum_of_squares(const Observations& observations, const JointFit& fit) const {
+    const MixedModel mixed(observations, rows_);
+    const double dof = static_cast<double>(mixed.dof(0) - static_cast<Index>(fit.linear.columns.size()));
+    return {std::pow(fit.variances.sigma[0], 2) * static_cast<double>(mixed.dof(0)), dof};
+  }
 
   /// A joint fit with one term more; theory's coefficient where the data do not speak against it.
   JointFit fit_with(Term term, double amplitude) const {
@@ -267,6 +308,7 @@ class Search {
   void swap_weaker() {
     for (std::size_t t = 0; t + 1 < result_.accepted.size(); ++t) {
       const Accepted old = result_.accepted[t];
+      if (old.term.per_group) continue;
       const JointFit without = fit_without(t);
       result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
       const Scan scan = scan_effects(without);
@@ -328,7 +370,9 @@ class Search {
                (found.curve.rotor < 0 || found.curve.rotor == curves_[c].rotor);
       });
       if (in) continue;
-      scan.candidates.push_back(as_candidate(curves_[c]));
+      Candidate candidate = as_candidate(curves_[c]);
+      if (!can_be_seen(candidate)) continue;
+      scan.candidates.push_back(std::move(candidate));
       tried.push_back(c);
     }
     if (tried.empty()) return false;
@@ -337,6 +381,7 @@ class Search {
     const std::size_t best = scan.order[0];
     const double p = maxima.p(scan.fits[best].evidence);
     Round round;
+    round.observed = scan.fits[best].evidence;
     round.null_maxima = maxima.values();
     round.outcome = fmt::format("p = {:.3g} for {}", p, curves_[tried[best]].label());
     result_.curve_rounds.push_back(std::move(round));
@@ -352,6 +397,7 @@ class Search {
   /// A name whose work a curve does as well was the wrong name for that curve.
   void drop_what_a_curve_replaces() {
     for (std::size_t t = result_.accepted.size(); t-- > 0;) {
+      if (result_.accepted[t].term.per_group) continue;  // stands in the baseline
       const JointFit without = fit_without(t);
       const double ratio = std::max(0.0, fit_.variances.log_likelihood - without.variances.log_likelihood);
       const double z = std::sqrt(2 * ratio);
@@ -363,8 +409,8 @@ class Search {
   }
 
   bool session_scatter_is_large() const {
-    for (std::size_t s = 0; s < mixed_.strata().size(); ++s) {
-      if (!mixed_.strata()[s].means()) continue;
+    for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
+      if (!mixed_->strata()[s].means()) continue;
       double below = 0;
       for (std::size_t r = 0; r < fit_.variances.ratio_probability[s].size(); ++r) {
         if (kRatios[r] <= settings_.session_ratio * settings_.session_ratio)
@@ -381,6 +427,10 @@ class Search {
   void find_confounded() {
     const std::vector<Accepted> all = result_.accepted;
     for (std::size_t t = 0; t < all.size(); ++t) {
+      if (all[t].term.per_group) {
+        confounded_.push_back(rivals_in_groups(all[t]));
+        continue;
+      }
       const JointFit without = fit_without(t);
       result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
       const Scan scan = scan_effects(without);
@@ -418,10 +468,41 @@ class Search {
                                       [&](const Ranked& r) { return r.term.effect->name == name; });
       if (listed) continue;
       const LossDifference difference = compare(validate(scan.candidates[i]), *own);
-      if (difference.mean >= 2 * difference.standard_error) continue;
+      if (difference.mean >= 2 * std::min(difference.standard_error, difference.expected_standard_error))
+        continue;
       Term term = scan.ways[i];
       term.parameters[0] = scan.fits[i].amplitude(0);
       result.push_back({term, scan.fits[i].evidence, 0, scan.fits[i].amplitude(0), 0});
+    }
+    return result;
+  }
+
+  /// The same for an effect with an amplitude of each group's own: each rival takes its place in the
+  /// baseline.
+  std::vector<Ranked> rivals_in_groups(const Accepted& accepted) const {
+    std::vector<Ranked> result;
+    Index place = observations_.slopes.cols();
+    for (auto other = result_.accepted.rbegin(); other != result_.accepted.rend(); ++other) {
+      if (!other->term.per_group) continue;
+      --place;
+      if (other->term.effect == accepted.term.effect) break;
+    }
+    const Eigen::MatrixXd predicted = predict_response(observations_, {}, rows_);
+    const Components y = difference(y_, fit_.linear.offset);
+    const CrossValidation own = cross_validate(observations_, y, fit_.linear.columns, fit_.variances, rows_);
+    for (const Term& way : ways_) {
+      const std::string& name = way.effect->name;
+      const bool taken = already_in(way) || std::any_of(result.begin(), result.end(), [&](const Ranked& r) {
+                           return r.term.effect->name == name;
+                         });
+      if (taken) continue;
+      Observations other = observations_;
+      other.slopes.col(place) = respond(way, observations_, predicted).derivative[0][0];
+      const LossDifference difference_of_loss =
+          compare(cross_validate(other, y, fit_.linear.columns, fit_.variances, rows_), own);
+      const double error =
+          std::min(difference_of_loss.standard_error, difference_of_loss.expected_standard_error);
+      if (difference_of_loss.mean < 2 * error) result.push_back({.term = way});
     }
     return result;
   }
@@ -447,23 +528,23 @@ class Search {
     Stacked stacked(0, 0);
     double squares = 0;
     Index count = 0;
-    for (std::size_t s = 0; s < mixed_.strata().size(); ++s) {
-      if (!mixed_.strata()[s].means()) continue;
+    for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
+      if (!mixed_->strata()[s].means()) continue;
       Components components(1 + observations_.shape.size(),
                             Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
       components[0] = column;
-      stacked = mixed_.stack(s, {&components});
-      mixed_.project(s, 0, stacked);
+      stacked = mixed_->stack(s, {&components});
+      mixed_->project(s, 0, stacked);
       squares += stacked.squaredNorm();
       count += stacked.size();
     }
     return std::sqrt(squares / static_cast<double>(count));
   }
 
-  const Observations& observations_;
+  Observations observations_;  // a group's own amplitudes become a part of its baseline
   const std::vector<int>& rows_;
   const SearchSettings& settings_;
-  MixedModel mixed_;
+  std::unique_ptr<MixedModel> mixed_;
   std::vector<Term> ways_;
   std::vector<Curve> curves_;
   Components y_;

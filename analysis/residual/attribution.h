@@ -33,6 +33,7 @@ struct Ranked {
 struct Round {
   std::vector<Ranked> ranking;      // best way of each effect, best first
   std::vector<double> null_maxima;  // what the largest evidence is where there is no effect
+  double observed = 0;              // the largest evidence of the data
   double critical = 0;              // evidence that α asks for
   std::string outcome;              // in words: what was accepted, or why not
 };
@@ -54,7 +55,8 @@ struct Attribution {
   std::vector<Accepted> accepted;
   std::vector<FoundCurve> curves;
   bool session_unknown = false;
-  JointFit baseline, final;  // without and with the accepted terms and curves
+  JointFit baseline, final;   // without and with the accepted terms and curves
+  Observations observations;  // what `final` speaks of: with a group's own amplitudes among its baseline
   std::vector<Round> rounds, curve_rounds;
   double detectable_sigma = 0;  // rms of an effect, in y, that is found at 80 % power
 };

@@ -18,6 +18,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kFewestBlocks = 6;
+constexpr std::size_t kRowsPerGross = 10;  // at most one row of ten is set aside
 
 std::vector<int> all_rows(const Observations& observations) {
   std::vector<int> rows(static_cast<std::size_t>(observations.rows()));
@@ -131,12 +132,41 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
   return result;
 }
 
+/// Amplitudes of each group's own: their median over the groups, and its interval.
+ParameterEstimate estimate_over_groups(const Observations& observations, const Term& term,
+                                       const std::vector<int>& rows) {
+  Term unit = term;
+  unit.per_group = false;
+  unit.parameters[0] = 0;
+  const MatrixXd x = respond(unit, observations, predict_response(observations, {}, rows)).derivative[0][0];
+  std::map<int, std::vector<int>> groups;
+  for (const int row : rows) groups[observations.group[static_cast<std::size_t>(row)]].push_back(row);
+  std::vector<double> amplitudes;
+  for (const auto& [group, own] : groups) {
+    const VectorXd u = x(own, 0).array() - x(own, 0).mean(),
+                   y = observations.y(own, 0).array() - observations.y(own, 0).mean();
+    if (u.squaredNorm() > 0) amplitudes.push_back(u.dot(y) / u.squaredNorm());
+  }
+  const auto quantile = [&amplitudes](double p) {
+    std::sort(amplitudes.begin(), amplitudes.end());
+    return amplitudes[static_cast<std::size_t>(std::clamp(p, 0.0, 1.0) *
+                                               static_cast<double>(amplitudes.size() - 1))];
+  };
+  const double half =
+      1.96 / (2 * std::sqrt(static_cast<double>(amplitudes.size())));  // order statistics of a median
+  const EffectParameter& parameter = term.effect->parameters[0];
+  return {parameter.name, parameter.unit, quantile(0.5), quantile(0.5 - half), quantile(0.5 + half), false};
+}
+
+}  // namespace
+
 std::string unit_of(const Observations& observations, const EffectParameter& parameter) {
-  // Without a calibration there are no volts: what would be volts is in the response's unit.
   const bool volts = parameter.unit == "V" || parameter.unit.starts_with("V/");
   if (!volts || (observations.newtons_per_volt.array() != 1).any()) return parameter.unit;
   return observations.unit + parameter.unit.substr(1);
 }
+
+namespace {
 
 // --- curves
 // ------------------------------------------------------------------------------------------------------------
@@ -252,6 +282,21 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
   return result;
 }
 
+/// Conditions that never changed, and so keep an effect from being tested.
+void warn_of_constant(const Observations& observations, Explanation& explanation) {
+  std::set<std::string> constant;
+  for (const Untestable& entry : explanation.untestable)
+    for (const Effect& effect : all_effects())
+      for (const std::string& name : effect.covariates) {
+        const Covariate* covariate = observations.find(name);
+        if (entry.effect == effect.name && entry.missing.empty() && covariate != nullptr &&
+            !covariate->derived && covariate->value.maxCoeff() == covariate->value.minCoeff())
+          constant.insert(name);
+      }
+  for (const std::string& name : constant)
+    explanation.warnings.push_back(name + " is the same in every run: nothing can be found that follows it");
+}
+
 /// Pairs of covariates that no campaign of this design can tell apart.
 void warn_of_collinear(const Observations& observations, Explanation& explanation) {
   for (std::size_t a = 0; a < observations.covariates.size(); ++a)
@@ -283,20 +328,45 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
   explanation.untestable = std::move(once);
 }
 
-/// Rows whose residual is beyond what n normal ones reach once in a hundred data sets.
-std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors) {
+/// Rows whose externally studentised residual is beyond what n normal ones reach once in a hundred data sets.
+/// `errors` are of the fitted rows: their variance is σ²(1 − h), where expected_std has σ²(1 + h).
+std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
+                                     const NullFit& variances, double dof) {
   std::vector<SuspectRow> result;
-  const double limit = -normal_quantile(0.005 / static_cast<double>(std::max<Index>(1, errors.error.size())));
+  const double limit = student_t_quantile(
+      1 - 0.005 / static_cast<double>(std::max<Index>(1, errors.error.size())), std::max(dof - 1, 1.0));
+  double sigma2 = 0;
+  const double channels = static_cast<double>(observations.channels());
+  for (std::size_t s = 0; s < (channels > 1 ? 2U : 1U); ++s)
+    sigma2 += std::pow(variances.sigma[s], 2) * (1 + kRatios[variances.ratio[s]]) *
+              (s == 0 ? 1 : channels - 1) / channels;
   for (std::size_t r = 0; r < errors.rows.size(); ++r) {
     double worst = 0;
     for (Index c = 0; c < errors.error.cols(); ++c) {
-      const double z = errors.error(static_cast<Index>(r), c) / errors.expected_std(static_cast<Index>(r), c);
-      if (std::abs(z) > std::abs(worst)) worst = -z;  // measured less predicted
+      const double unit = observations.multiplicative ? std::abs(observations.value(errors.rows[r], c)) : 1;
+      const double leverage = std::pow(errors.expected_std(static_cast<Index>(r), c) / unit, 2) / sigma2 - 1;
+      const double inner =
+          -errors.error(static_cast<Index>(r), c) / unit / std::sqrt(sigma2 * std::max(1 - leverage, 1e-3));
+      const double room = std::max(dof - inner * inner, 1e-3);
+      const double outer = inner * std::sqrt(std::max(dof - 1, 1.0) / room);
+      if (std::abs(outer) > std::abs(worst)) worst = outer;
     }
     if (std::abs(worst) > limit)
       result.push_back({observations.name[static_cast<std::size_t>(errors.rows[r])], worst});
   }
+  std::sort(result.begin(), result.end(), [](const SuspectRow& a, const SuspectRow& b) {
+    return std::abs(a.studentised) > std::abs(b.studentised);
+  });
   return result;
+}
+
+double degrees_of_freedom(const Observations& observations, const JointFit& fit,
+                          const std::vector<int>& rows) {
+  const MixedModel mixed(observations, rows, fit.variances.ratio);
+  Index dof = -static_cast<Index>(fit.linear.columns.size());
+  for (std::size_t s = 0; s < mixed.strata().size(); ++s)
+    if (mixed.strata()[s].means()) dof += mixed.dof(s);
+  return static_cast<double>(std::max<Index>(dof, 2));
 }
 
 std::string verdict_of(const Explanation& explanation) {
@@ -336,6 +406,8 @@ void report_adopted(const Observations& observations, const Attribution& found, 
   for (std::size_t t = 0; t < found.accepted.size(); ++t) {
     const Accepted& accepted = found.accepted[t];
     AdoptedEffect adopted{whole.model.terms[t], parameters[t], accepted.p, accepted.gain, {}, {}};
+    if (adopted.term.per_group)
+      adopted.parameters[0] = estimate_over_groups(observations, adopted.term, rows);
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k)
       adopted.parameters[k].unit = unit_of(observations, adopted.term.effect->parameters[k]);
     for (const Ranked& rival : accepted.confounded)
@@ -347,10 +419,9 @@ void report_adopted(const Observations& observations, const Attribution& found, 
   }
 }
 
-}  // namespace
-
-Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
-                    const SearchSettings& settings) {
+/// The protocol, once, on all rows.
+Explanation explain_all(const Observations& observations, const std::vector<const Effect*>& effects,
+                        const SearchSettings& settings) {
   Explanation explanation{.campaign = observations.campaign,
                           .response = observations.response,
                           .unit = observations.unit,
@@ -364,6 +435,7 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
     explanation.warnings.push_back(covariate + " is " + why);
   const std::vector<int> rows = all_rows(observations);
   explanation.untestable = untestable_effects(observations, effects, rows);
+  warn_of_constant(observations, explanation);
   warn_of_collinear(observations, explanation);
   if (observations.blocks() < kFewestBlocks) {
     explain_too_few(observations, explanation);
@@ -385,31 +457,99 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
   if (!found.curves.empty()) {
     MeanModel terms = found.final.model;
     terms.curves.clear();
-    named = found.accepted.empty() ? found.baseline : fit_jointly(observations, terms, seal.open);
+    named = found.accepted.empty() ? found.baseline : fit_jointly(found.observations, terms, seal.open);
   }
   const HeldOutErrors before = score(observations, found.baseline, named.variances, seal.open, seal.sealed);
-  const HeldOutErrors after = score(observations, named, named.variances, seal.open, seal.sealed);
+  const Observations& wide = found.observations;
+  const HeldOutErrors after = score(wide, named, named.variances, seal.open, seal.sealed);
   set_interval(observations, before, settings.seed, explanation.before);
   set_interval(observations, after, settings.seed, explanation.after);
   explanation.noise_floor =
-      rms(score(observations, found.final, found.final.variances, seal.open, seal.sealed).expected_std);
+      rms(score(wide, found.final, found.final.variances, seal.open, seal.sealed).expected_std);
   explanation.before.rmse = rms(residuals(observations, found.baseline, seal.open));
-  explanation.after.rmse = rms(residuals(observations, named, seal.open));
+  explanation.after.rmse = rms(residuals(wide, named, seal.open));
 
   settings.progress("estimating parameters");
-  const JointFit whole = fit_jointly(observations, found.final.model, rows);
+  const JointFit whole = fit_jointly(wide, found.final.model, rows);
   const JointFit whole_baseline = fit_jointly(observations, {}, rows);
   explanation.model = whole.model;
   explanation.residual_before = residuals(observations, whole_baseline, rows);
-  const HeldOutErrors fitted = score(observations, whole, whole.variances, rows, rows);
+  const HeldOutErrors fitted = score(wide, whole, whole.variances, rows, rows);
   explanation.residual_after = fitted.error;
-  report_adopted(observations, found, whole, rows, explanation);
+  report_adopted(wide, found, whole, rows, explanation);
   for (const FoundCurve& curve : found.curves)
-    explanation.unknown.push_back(describe(observations, whole, curve, rows));
+    explanation.unknown.push_back(describe(wide, whole, curve, rows));
   if (found.session_unknown && found.curves.empty())
     explanation.unknown.push_back(describe_sessions(observations, fitted.error, rows));
-  explanation.suspect_rows = suspect_rows(observations, fitted);
+  explanation.suspect_rows =
+      suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
   explanation.verdict = verdict_of(explanation);
+  return explanation;
+}
+
+/// The worst row of a table whose rows stand for themselves, if it is beyond doubt with all that the other
+/// axes can explain in the model.
+std::optional<SuspectRow> gross_row(const Observations& observations) {
+  constexpr double kGross = 6, kFewestLeft = 6;
+  if (!observations.blocks_are_rows || observations.other_axes.empty()) return {};
+  const std::vector<int> rows = all_rows(observations);
+  std::vector<Components> columns;
+  for (const std::string& axis : observations.other_axes) columns.push_back({observations.find(axis)->value});
+  const Components y = response_components(observations);
+  JointFit fit;
+  fit.linear.columns = columns;
+  fit.variances = CandidateScan(MixedModel(observations, rows), columns, {}).null_fit(y);
+  const double dof = degrees_of_freedom(observations, fit, rows);
+  if (dof < kFewestLeft) return {};
+  const HeldOutErrors errors = predict_held_out(observations, y, columns, fit.variances, rows, rows);
+  const std::vector<SuspectRow> suspects = suspect_rows(observations, errors, fit.variances, dof);
+  if (suspects.empty() || std::abs(suspects[0].studentised) < kGross) return {};
+  return suspects[0];
+}
+
+/// F + x F_other, the other axis being a column of the table.
+struct OtherAxis {
+  template <class T>
+  T operator()(const Sample& s, const T* p, const T& force) const {
+    return force + p[0] * s.x[0];
+  }
+};
+
+}  // namespace
+
+std::vector<Effect> effects_of_other_axes(const Observations& observations) {
+  std::vector<Effect> effects;
+  for (const std::string& axis : observations.other_axes) {
+    effects.push_back(make_effect<OtherAxis>({.name = "crosstalk",
+                                              .form = axis,
+                                              .formula = "F + x F_other",
+                                              .physics = "a load on another axis bends this one's spring",
+                                              .parameters = {{"coefficient", observations.unit, -1e12, 1e12}},
+                                              .covariates = {axis},
+                                              .additive = true,
+                                              .sign_rule = "either",
+                                              .force_N = {},
+                                              .jet_N = {}}));
+  }
+  return effects;
+}
+
+Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
+                    const SearchSettings& settings) {
+  // A gross error hides what else is there: of a table's rows it is set aside, and said.
+  std::vector<SuspectRow> gross;
+  Observations kept = observations;
+  while (gross.size() < kept.name.size() / kRowsPerGross) {
+    const auto row = gross_row(kept);
+    if (!row) break;
+    gross.push_back(*row);
+    std::vector<int> rows;
+    for (int r = 0; r < static_cast<int>(kept.rows()); ++r)
+      if (kept.name[static_cast<std::size_t>(r)] != row->row) rows.push_back(r);
+    kept = kept.subset(rows);
+  }
+  Explanation explanation = explain_all(kept, effects, settings);
+  explanation.suspect_rows.insert(explanation.suspect_rows.begin(), gross.begin(), gross.end());
   return explanation;
 }
 

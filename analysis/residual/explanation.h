@@ -76,14 +76,20 @@ struct Explanation {
 
   // what the pages show beside it
   std::vector<Round> rounds, curve_rounds;
-  std::vector<std::vector<std::string>> residual_plots;
   MeanModel model;                                  // fitted to all runs
   Eigen::MatrixXd residual_before, residual_after;  // n × c, unit of the response
 };
 
+/// Crosstalk from a table's other axes, as candidates of their own.
+std::vector<Effect> effects_of_other_axes(const Observations& observations);
+
 /// The protocol: seal, search on the open runs, open the seal once, estimate on all.
 Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
                     const SearchSettings& settings);
+
+/// A parameter's unit on these data: without a calibration there are no volts, and what would be volts is in
+/// the response's unit.
+std::string unit_of(const Observations& observations, const EffectParameter& parameter);
 
 /// The setting that tells `first` from `second` best, among conditions the rig has nearly seen.
 std::optional<SeparatingRun> separating_run(const Observations& observations, const Term& first,

@@ -56,18 +56,6 @@ Json unknown_json(const UnknownStructure& unknown) {
           {"shape", shape}};
 }
 
-std::string verdict_in_words(const std::string& verdict) {
-  if (verdict == "explained") return "The effects below explain what the model lacked.";
-  if (verdict == "partly_explained")
-    return "The effects below explain a part; structure without a name remains.";
-  if (verdict == "confounded")
-    return "An effect is there, but these data cannot tell which of several it is.";
-  if (verdict == "unknown")
-    return "There is structure, but no candidate accounts for it: the cause is not known.";
-  if (verdict == "no_structure") return "Nothing beyond chance was found.";
-  return "There are too few blocks to say anything.";
-}
-
 std::string parameters_in_words(const AdoptedEffect& adopted) {
   std::string text;
   for (const ParameterEstimate& parameter : adopted.parameters) {
@@ -85,6 +73,18 @@ std::string joined(const std::vector<std::string>& words) {
 }
 
 }  // namespace
+
+std::string verdict_in_words(const std::string& verdict) {
+  if (verdict == "explained") return "The effects below explain what the model lacked.";
+  if (verdict == "partly_explained")
+    return "The effects below explain a part; structure without a name remains.";
+  if (verdict == "confounded")
+    return "An effect is there, but these data cannot tell which of several it is.";
+  if (verdict == "unknown")
+    return "There is structure, but no candidate accounts for it: the cause is not known.";
+  if (verdict == "no_structure") return "Nothing beyond chance was found.";
+  return "There are too few blocks to say anything.";
+}
 
 std::string explanation_json(const Explanation& e) {
   Json json{{"format", "tunnelrig-explain/1"},

@@ -13,8 +13,17 @@ std::string explanation_json(const Explanation& explanation);
 /// Plain text, what a person reads on a terminal.
 std::string explanation_text(const Explanation& explanation);
 
+/// "There is structure, but …": what a verdict means.
+std::string verdict_in_words(const std::string& verdict);
+
+/// Where a page comes from.
+struct PageOrigin {
+  std::string db, program_version, arguments, created_utc;
+};
+
 /// One self-contained page: residuals against covariates before and after, the ranking, null distributions.
-std::string explanation_html(const Explanation& explanation, const Observations& observations);
+std::string explanation_html(const Explanation& explanation, const Observations& observations,
+                             const SearchSettings& settings, const PageOrigin& origin);
 
 /// Every candidate with formula, parameters, what it needs, and whether these data can test it (null: no
 /// data).

@@ -58,7 +58,8 @@ void own_constants(const Observations& observations, const std::vector<int>& row
       runs[observations.group[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
   for (const auto& [group, members] : runs) {
     Eigen::RowVectorXd constant = Eigen::RowVectorXd::Zero(plain.cols());
-    const double used = static_cast<double>((members.size() + 1) / 2);
+    const std::size_t halves = (members.size() + 1) / 2;
+    const double used = static_cast<double>(halves);
     for (std::size_t m = 0; m < members.size(); m += 2) constant += plain.row(members[m]) / used;
     for (std::size_t m = 1; m < members.size(); m += 2) {
       residual.row(members[m]) = plain.row(members[m]) - constant;
@@ -67,23 +68,33 @@ void own_constants(const Observations& observations, const std::vector<int>& row
   }
 }
 
-/// eᵀV⁻¹e of one stratum, block by block; V = σ²(I + a 11ᵀ).
-double mahalanobis(const Observations& observations, const std::vector<int>& rows, const MatrixXd& error,
-                   double sigma, double ratio) {
-  double sum = 0;
-  for (Index mode = 0; mode < error.cols(); ++mode) {
-    std::map<int, std::array<double, 3>> blocks;  // n, Σe, Σe²
-    for (std::size_t r = 0; r < rows.size(); ++r) {
-      const double e = error(static_cast<Index>(r), mode);
-      if (std::isnan(e)) continue;
-      auto& block = blocks[observations.block[static_cast<std::size_t>(rows[r])]];
-      block[0] += 1;
-      block[1] += e;
-      block[2] += e * e;
-    }
-    for (const auto& [id, b] : blocks) sum += b[2] - ratio / (1 + ratio * b[0]) * b[1] * b[1];
+/// V^(−½)e of one stratum, block by block; V = σ²(I + a 11ᵀ). Missing errors count as none.
+VectorXd whitened(const Observations& observations, const std::vector<int>& rows, const MatrixXd& error,
+                  double sigma, double ratio) {
+  MatrixXd result = error.array().isNaN().select(0, error);
+  std::map<int, std::vector<Index>> blocks;
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    if (!std::isnan(error(static_cast<Index>(r), 0)))
+      blocks[observations.block[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
+  for (const auto& [block, runs] : blocks) {
+    const double n = static_cast<double>(runs.size());
+    const Eigen::RowVectorXd share =
+        (1 - 1 / std::sqrt(1 + ratio * n)) * MatrixXd(result(runs, Eigen::all)).colwise().mean();
+    for (const Index run : runs) result.row(run) -= share;
   }
-  return sum / std::max(sigma * sigma, 1e-300);
+  return result.reshaped() / std::max(sigma, 1e-150);
+}
+
+VectorXd concatenated(const std::vector<VectorXd>& parts) {
+  Index size = 0;
+  for (const VectorXd& part : parts) size += part.size();
+  VectorXd result(size);
+  Index at = 0;
+  for (const VectorXd& part : parts) {
+    result.segment(at, part.size()) = part;
+    at += part.size();
+  }
+  return result;
 }
 
 }  // namespace
@@ -110,7 +121,8 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
   for (const Components& column : columns) items.push_back(&column);
   const Fit fit = fit_amplitudes(model, y, items, null);
   const Index n = static_cast<Index>(test_rows.size()), c = observations.channels();
-  HeldOutErrors result{test_rows, MatrixXd::Zero(n, c), MatrixXd::Zero(n, c), 0, fit.amplitude};
+  HeldOutErrors result{test_rows, MatrixXd::Zero(n, c), MatrixXd::Zero(n, c), {}, fit.amplitude};
+  std::vector<VectorXd> parts;
   MatrixXd error_by_mode = MatrixXd::Zero(n, c), variance_by_mode = MatrixXd::Zero(n, c);
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
     const MixedModel::Stratum& stratum = model.strata()[s];
@@ -132,11 +144,12 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     if (stratum.means() && observations.groups_within_blocks)
       own_constants(observations, test_rows, Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes),
                     sigma2, errors, variances);
-    result.loss += mahalanobis(observations, test_rows, errors, null.sigma[s], kRatios[null.ratio[s]]);
+    parts.push_back(whitened(observations, test_rows, errors, null.sigma[s], kRatios[null.ratio[s]]));
     if (!stratum.means()) continue;
     error_by_mode.middleCols(stratum.first_mode, stratum.modes) = errors;
     variance_by_mode.middleCols(stratum.first_mode, stratum.modes) = variances;
   }
+  result.whitened = concatenated(parts);
   const MatrixXd error_y = error_by_mode * model.mode_matrix().transpose();
   const MatrixXd std_y = (variance_by_mode * model.mode_matrix().transpose().cwiseAbs2()).cwiseSqrt();
   for (Index r = 0; r < n; ++r)
@@ -180,15 +193,21 @@ double CrossValidation::rmse() const {
 
 VectorXd CrossValidation::losses() const {
   VectorXd result(static_cast<Index>(folds.size()));
-  for (std::size_t fold = 0; fold < folds.size(); ++fold) result(static_cast<Index>(fold)) = folds[fold].loss;
+  for (std::size_t fold = 0; fold < folds.size(); ++fold)
+    result(static_cast<Index>(fold)) = folds[fold].loss();
   return result;
 }
 
 LossDifference compare(const CrossValidation& worse, const CrossValidation& better) {
   const VectorXd difference = worse.losses() - better.losses();
   const double n = static_cast<double>(difference.size());
-  const double mean = difference.mean();
-  return {mean, std::sqrt((difference.array() - mean).square().sum() / (n * (n - 1)))};
+  LossDifference result{.mean = difference.mean()};
+  result.standard_error = std::sqrt((difference.array() - result.mean).square().sum() / (n * (n - 1)));
+  double distance2 = 0;
+  for (std::size_t fold = 0; fold < worse.folds.size(); ++fold)
+    distance2 += (worse.folds[fold].whitened - better.folds[fold].whitened).squaredNorm();
+  result.expected_standard_error = 2 * std::sqrt(distance2) / n;
+  return result;
 }
 
 }  // namespace tunnelrig

@@ -14,9 +14,10 @@ struct HeldOutErrors {
   Eigen::MatrixXd
       error;  // rows × channels, response's unit, predicted less measured; NaN where there is none
   Eigen::MatrixXd
-      expected_std;           // what the error would scatter by if the mean model were exact, unit as above
-  double loss = 0;            // eᵀV⁻¹e over all strata: what models are compared by
-  Eigen::VectorXd amplitude;  // of the columns, from the fit
+      expected_std;          // what the error would scatter by if the mean model were exact, unit as above
+  Eigen::VectorXd whitened;  // V^(−½)e over all strata; 0 where there is none
+  double loss() const { return whitened.squaredNorm(); }  // eᵀV⁻¹e: what models are compared by
+  Eigen::VectorXd amplitude;                              // of the columns, from the fit
 
   double sum_of_squares() const;  // of the errors that there are
   Eigen::Index count() const;
@@ -53,6 +54,11 @@ CrossValidation cross_validate(const Observations& observations, const Component
 /// Mean difference of two models' losses over the folds, and its standard error: `worse` less `better`.
 struct LossDifference {
   double mean = 0, standard_error = 0;
+
+  /// The same from the scatter of the fitted model: e'V⁻¹e changes by 2e'V⁻¹d + d'V⁻¹d where the predictions
+  /// differ by d. Where few folds hold all of the difference, these folds' scatter says nothing of its error,
+  /// and this does.
+  double expected_standard_error = 0;
 };
 LossDifference compare(const CrossValidation& worse, const CrossValidation& better);
 

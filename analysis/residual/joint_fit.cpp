@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include <ceres/ceres.h>
 
@@ -20,7 +21,7 @@ struct FreeParameter {
 
 bool is_free(const Term& term, std::size_t k) {
   const EffectParameter& parameter = term.effect->parameters[k];
-  if (parameter.role == ParameterRole::kChangePoint) return false;
+  if (parameter.role == ParameterRole::kChangePoint || term.per_group) return false;
   return !(k == 0 && term.at_theory);
 }
 
@@ -124,11 +125,19 @@ bool solve(const Observations& observations, MeanModel& model, const Whitener& w
   if (free.empty()) return true;
   std::vector<double> values;
   for (const FreeParameter& f : free) values.push_back(model.terms[f.term].parameters[f.parameter]);
-  ceres::Problem problem;
-  problem.AddResidualBlock(new Residuals(observations, model, whitener, predicted), nullptr, values.data());
   for (std::size_t i = 0; i < free.size(); ++i) {
     const EffectParameter& parameter = model.terms[free[i].term].effect->parameters[free[i].parameter];
     values[i] = std::clamp(values[i], parameter.lower, parameter.upper);
+  }
+  auto residuals = std::make_unique<Residuals>(observations, model, whitener, predicted);
+  VectorXd at_start(residuals->num_residuals());
+  const double* start = values.data();
+  // Ceres would say on standard error that it cannot begin where a force changes its sign.
+  if (!residuals->Evaluate(&start, at_start.data(), nullptr)) return false;
+  ceres::Problem problem;
+  problem.AddResidualBlock(residuals.release(), nullptr, values.data());
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    const EffectParameter& parameter = model.terms[free[i].term].effect->parameters[free[i].parameter];
     problem.SetParameterLowerBound(values.data(), static_cast<int>(i), parameter.lower);
     problem.SetParameterUpperBound(values.data(), static_cast<int>(i), parameter.upper);
   }
@@ -192,6 +201,7 @@ LinearModel linearise(const Observations& observations, const MeanModel& model, 
       Components(1 + observations.shape.size(), MatrixXd::Zero(observations.rows(), observations.channels())),
       {}};
   for (const Term& term : model.terms) {
+    if (term.per_group) continue;  // a part of the baseline (Observations::slopes)
     TermResponse response = respond(term, observations, predicted);
     for (std::size_t k = 0; k < linear.offset.size(); ++k) linear.offset[k] += response.value[k];
     for (std::size_t k = 0; k < response.derivative.size(); ++k)

@@ -38,8 +38,6 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
   std::map<int, std::vector<Index>> blocks;
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     blocks[observations.block[static_cast<std::size_t>(rows_[r])]].push_back(static_cast<Index>(r));
-    groups_.emplace(observations.group[static_cast<std::size_t>(rows_[r])],
-                    static_cast<Index>(groups_.size()));
   }
   if (observations.blocks_are_rows) ratios_ = 1;
   for (auto& [block, runs] : blocks) blocks_.push_back(std::move(runs));
@@ -48,32 +46,70 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
     if (ratio.empty() || std::find(ratio.begin(), ratio.end(), r) != ratio.end()) prepare(r);
 }
 
-MatrixXd MixedModel::baseline_of(const std::vector<int>& rows) const {
-  MatrixXd baseline = MatrixXd::Zero(static_cast<Index>(rows.size()),
-                                     static_cast<Index>(groups_.size()) + observations_.slopes.cols());
+MatrixXd MixedModel::baseline_of(const std::vector<int>& rows, const std::vector<int>& groups) const {
+  const Index each = 1 + observations_.slopes.cols();
+  MatrixXd baseline =
+      MatrixXd::Zero(static_cast<Index>(rows.size()), static_cast<Index>(groups.size()) * each);
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const auto row = static_cast<Index>(r);
-    const auto group = groups_.find(observations_.group[static_cast<std::size_t>(rows[r])]);
-    if (group == groups_.end()) {
+    const int own = observations_.group[static_cast<std::size_t>(rows[r])];
+    const auto group = std::lower_bound(groups.begin(), groups.end(), own);
+    if (group == groups.end() || *group != own) {
       baseline.row(row).setConstant(std::numeric_limits<double>::quiet_NaN());
       continue;
     }
-    baseline(row, group->second) = 1;
-    baseline.row(row).tail(observations_.slopes.cols()) = observations_.slopes.row(rows[r]);
+    const Index first = (group - groups.begin()) * each;
+    baseline(row, first) = 1;
+    baseline.row(row).segment(first + 1, each - 1) = observations_.slopes.row(rows[r]);
   }
   return baseline;
 }
 
+MixedModel::Part MixedModel::decompose(std::size_t ratio, std::vector<Index> runs,
+                                       std::vector<int> groups) const {
+  std::vector<int> rows;
+  for (const Index run : runs) rows.push_back(rows_[static_cast<std::size_t>(run)]);
+  MatrixXd baseline = baseline_of(rows, groups);
+  if (ratio > 0) whiten(ratio, baseline);  // then the part holds all runs
+  Part part{.runs = std::move(runs),
+            .groups = std::move(groups),
+            .qr = baseline.colPivHouseholderQr(),
+            .basis = {}};
+  // Slopes may be collinear with the constants: only the columns of full rank count.
+  part.basis = part.qr.householderQ() * MatrixXd::Identity(baseline.rows(), part.qr.rank());
+  return part;
+}
+
 void MixedModel::prepare(std::size_t ratio) {
-  MatrixXd whitened = baseline_of(rows_);
-  whiten(ratio, whitened);
-  // Slopes may be collinear with the groups' constants: only the columns of full rank count.
-  Prepared& p = prepared_[ratio];
-  p.qr.compute(whitened);
-  baseline_columns_ = p.qr.rank();
-  p.basis = p.qr.householderQ() * MatrixXd::Identity(whitened.rows(), baseline_columns_);
-  p.log_xvx = 2 * p.qr.matrixQR().diagonal().head(baseline_columns_).array().abs().log().sum();
-  for (const auto& runs : blocks_) p.log_v += std::log1p(kRatios[ratio] * static_cast<double>(runs.size()));
+  std::map<int, std::vector<Index>> runs_of_group;
+  for (std::size_t r = 0; r < rows_.size(); ++r)
+    runs_of_group[observations_.group[static_cast<std::size_t>(rows_[r])]].push_back(static_cast<Index>(r));
+  Prepared& prepared = prepared_[ratio];
+  if (ratio == 0) {  // without sessions, each group stands for itself: small systems instead of one large one
+    for (const auto& [group, runs] : runs_of_group) prepared.parts.push_back(decompose(ratio, runs, {group}));
+  } else {
+    std::vector<Index> all(rows_.size());
+    std::iota(all.begin(), all.end(), Index{0});
+    std::vector<int> groups;
+    for (const auto& [group, runs] : runs_of_group) groups.push_back(group);
+    prepared.parts.push_back(decompose(ratio, std::move(all), std::move(groups)));
+  }
+  baseline_columns_ = 0;
+  for (const Part& part : prepared.parts) {
+    baseline_columns_ += part.basis.cols();
+    prepared.log_xvx += 2 * part.qr.matrixQR().diagonal().head(part.basis.cols()).array().abs().log().sum();
+  }
+  for (const auto& runs : blocks_)
+    prepared.log_v += std::log1p(kRatios[ratio] * static_cast<double>(runs.size()));
+}
+
+std::vector<Index> MixedModel::rows_of(const Part& part, const std::vector<int>& rows) const {
+  std::vector<Index> result;
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    if (std::binary_search(part.groups.begin(), part.groups.end(),
+                           observations_.group[static_cast<std::size_t>(rows[r])]))
+      result.push_back(static_cast<Index>(r));
+  return result;
 }
 
 /// V^(−½) block by block: I − (1 − 1/√(1 + a n)) 11ᵀ/n.
@@ -116,9 +152,15 @@ void MixedModel::project(std::size_t stratum, std::size_t ratio, Stacked& column
   const Index n = static_cast<Index>(rows_.size());
   Eigen::Map<MatrixXd> by_mode(columns.data(), n, columns.size() / n);
   whiten(ratio, by_mode);
-  if (strata_[stratum].means()) {
-    const MatrixXd absorbed = prepared_[ratio].basis.transpose() * by_mode;
-    by_mode.noalias() -= prepared_[ratio].basis * absorbed;
+  if (!strata_[stratum].means()) return;
+  const auto& parts = prepared_[ratio].parts;
+  if (parts.size() == 1) {
+    by_mode.noalias() -= parts[0].basis * (parts[0].basis.transpose() * by_mode);
+    return;
+  }
+  for (const Part& part : parts) {
+    const MatrixXd own = by_mode(part.runs, Eigen::all);
+    by_mode(part.runs, Eigen::all) -= part.basis * (part.basis.transpose() * own);
   }
 }
 
@@ -128,23 +170,39 @@ Stacked MixedModel::baseline_prediction(std::size_t stratum, std::size_t ratio, 
   const Index modes = strata_[stratum].modes;
   Stacked result = Stacked::Zero(wanted * modes, columns.cols());
   if (!strata_[stratum].means()) return result;
+  result.setConstant(std::numeric_limits<double>::quiet_NaN());
   MatrixXd by_mode = Eigen::Map<const MatrixXd>(columns.data(), n, modes * columns.cols());
   whiten(ratio, by_mode);
-  Eigen::Map<MatrixXd>(result.data(), wanted, modes * columns.cols()) =
-      baseline_of(rows) * prepared_[ratio].qr.solve(by_mode);
+  Eigen::Map<MatrixXd> predicted(result.data(), wanted, modes * columns.cols());
+  for (const Part& part : prepared_[ratio].parts) {
+    const std::vector<Index> where = rows_of(part, rows);
+    if (where.empty()) continue;
+    std::vector<int> asked;
+    for (const Index r : where) asked.push_back(rows[static_cast<std::size_t>(r)]);
+    predicted(where, Eigen::all) =
+        baseline_of(asked, part.groups) * part.qr.solve(MatrixXd(by_mode(part.runs, Eigen::all)));
+  }
   return result;
 }
 
 Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t ratio,
                                               const std::vector<int>& rows) const {
   if (!strata_[stratum].means()) return Eigen::VectorXd::Zero(static_cast<Index>(rows.size()));
-  const Prepared& p = prepared_[ratio];
-  // L_row (LᵀV⁻¹L)⁻¹ L_rowᵀ with LᵀV⁻¹L = P RᵀR Pᵀ
-  const MatrixXd r =
-      p.qr.matrixQR().topLeftCorner(baseline_columns_, baseline_columns_).triangularView<Eigen::Upper>();
-  const MatrixXd permuted = (baseline_of(rows) * p.qr.colsPermutation()).leftCols(baseline_columns_);
-  const MatrixXd half = r.transpose().triangularView<Eigen::Lower>().solve(permuted.transpose());
-  return half.colwise().squaredNorm().transpose();
+  Eigen::VectorXd result =
+      Eigen::VectorXd::Constant(static_cast<Index>(rows.size()), std::numeric_limits<double>::quiet_NaN());
+  for (const Part& part : prepared_[ratio].parts) {
+    const std::vector<Index> where = rows_of(part, rows);
+    if (where.empty()) continue;
+    std::vector<int> asked;
+    for (const Index r : where) asked.push_back(rows[static_cast<std::size_t>(r)]);
+    // L_row (LᵀV⁻¹L)⁻¹ L_rowᵀ with LᵀV⁻¹L = P RᵀR Pᵀ
+    const Index rank = part.basis.cols();
+    const MatrixXd r = part.qr.matrixQR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
+    const MatrixXd permuted = (baseline_of(asked, part.groups) * part.qr.colsPermutation()).leftCols(rank);
+    const MatrixXd half = r.transpose().triangularView<Eigen::Lower>().solve(permuted.transpose());
+    result(where) = half.colwise().squaredNorm().transpose();
+  }
+  return result;
 }
 
 Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sigma,

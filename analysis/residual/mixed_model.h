@@ -70,15 +70,27 @@ class MixedModel {
   const Eigen::MatrixXd& mode_matrix() const { return modes_; }
 
  private:
-  void prepare(std::size_t ratio);
-  Eigen::MatrixXd baseline_of(const std::vector<int>& rows) const;
-  void whiten(std::size_t ratio, Eigen::Ref<Eigen::MatrixXd> columns) const;
-
-  struct Prepared {
+  /// The baseline of some runs, whitened and decomposed: of one group, or of all where sessions tie them
+  /// together.
+  struct Part {
+    std::vector<Eigen::Index> runs;                  // positions in rows_
+    std::vector<int> groups;                         // column block of each
     Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;  // of the whitened baseline
     Eigen::MatrixXd basis;                           // orthonormal
-    double log_v = 0, log_xvx = 0;                   // log|V|, log|LᵀV⁻¹L|
   };
+  struct Prepared {
+    std::vector<Part> parts;
+    double log_v = 0, log_xvx = 0;  // log|V|, log|LᵀV⁻¹L|
+  };
+
+  void prepare(std::size_t ratio);
+  Part decompose(std::size_t ratio, std::vector<Eigen::Index> runs, std::vector<int> groups) const;
+  /// Baseline columns of runs: a constant and the slopes for each of `groups`; NaN where the group is not
+  /// among them.
+  Eigen::MatrixXd baseline_of(const std::vector<int>& rows, const std::vector<int>& groups) const;
+  /// Rows of `rows` that a part speaks for.
+  std::vector<Eigen::Index> rows_of(const Part& part, const std::vector<int>& rows) const;
+  void whiten(std::size_t ratio, Eigen::Ref<Eigen::MatrixXd> columns) const;
 
   const Observations& observations_;
   std::vector<int> rows_;
@@ -86,7 +98,6 @@ class MixedModel {
   Eigen::MatrixXd modes_;
   std::vector<Stratum> strata_;
   std::size_t ratios_ = kRatios.size();
-  std::map<int, Eigen::Index> groups_;  // column of each group in the baseline
   Eigen::Index baseline_columns_ = 0;
   std::vector<Prepared> prepared_;  // by ratio
 };

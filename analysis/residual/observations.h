@@ -43,12 +43,13 @@ struct Observations {
   std::vector<int> group,
       block;  // baseline group (location) and block (session), from 0; blocks in order of time
   std::vector<std::string> group_name, block_name;
-  Eigen::MatrixXd slopes;  // n × s: baseline columns beside the groups' constants
-  std::vector<std::string> slope_name;
+  Eigen::MatrixXd
+      slopes;  // n × s: baseline columns beside the constants, with coefficients of each group's own
   std::vector<bool> in_tunnel;
   std::vector<int> previous;   // the run before in the same session, −1 for the first
   std::vector<bool> held_out;  // a table's hold_out expression; empty: seal blocks instead
   bool blocks_are_rows = false;
+  bool coefficient = false;  // the response is a thrust coefficient, or is made one by its measured speed
   bool groups_within_blocks =
       false;  // the block is the group: its baseline is estimated anew where it is held out
 
@@ -57,6 +58,8 @@ struct Observations {
   std::vector<Covariate> covariates;
   std::map<std::string, std::string> not_usable;  // covariate: why (missing in some runs, constant, a text)
   std::vector<std::string> left_out;              // "run: reason"
+
+  std::vector<std::string> other_axes;  // covariates of the same quantity as a linear baseline's column
 
   Eigen::Index rows() const { return y.rows(); }
   Eigen::Index channels() const { return y.cols(); }
@@ -67,6 +70,9 @@ struct Observations {
       if (covariate.name == wanted) return &covariate;
     return nullptr;
   }
+
+  /// The same of some rows only. Groups and blocks keep their numbers; for tables, whose rows have no order.
+  Observations subset(const std::vector<int>& kept) const;
 };
 
 struct ObservationChoice {
@@ -82,6 +88,9 @@ inline constexpr int kShapes = 6;
 /// has them. Throws InputError for a response or baseline that the campaign does not have, or a response
 /// without variation.
 Observations observe_campaign(const CampaignData& data, const ObservationChoice& choice);
+
+/// The same whether or not the response varies: what is known of the runs, which a model corrects them by.
+Observations observe_runs(const CampaignData& data, const ObservationChoice& choice);
 
 /// All rows. Throws InputError likewise.
 Observations observe_table(const ObservationTable& table, const ObservationChoice& choice);

@@ -100,14 +100,17 @@ void add_sheet_covariates(const Source& source, Observations& result) {
 
 /// Amplitudes of lines whose name `chosen` accepts, and the share of clipped samples, per channel.
 void add_raw_covariates(const Source& source, Observations& result) {
-  for (Index row = 0; row < source.rows(); ++row)
-    if (source.statistics(row) == nullptr) return;
+  Index missing = 0;
+  for (Index row = 0; row < source.rows(); ++row) missing += source.statistics(row) == nullptr ? 1 : 0;
+  if (missing == source.rows()) return;
   const auto add = [&](const std::string& name, const auto& value_of) {
-    Covariate covariate{name, MatrixXd::Zero(source.rows(), result.channels()), true};
+    Covariate covariate{name, MatrixXd::Constant(source.rows(), result.channels(), kNaN), true};
     for (Index row = 0; row < source.rows(); ++row)
-      for (Index c = 0; c < result.channels(); ++c)
+      for (Index c = 0; c < result.channels() && source.statistics(row) != nullptr; ++c)
         covariate.value(row, c) =
             value_of(*source.statistics(row), source.statistics(row)->channels[static_cast<std::size_t>(c)]);
+    if (missing > 0)
+      result.not_usable[name] = fmt::format("missing in {} of {} runs", missing, source.rows());
     result.covariates.push_back(std::move(covariate));
   };
   const auto lines = [](const auto& chosen) {
@@ -235,9 +238,6 @@ void set_response(const Source& source, const Response& response, Observations& 
       result.value(row, c) = response.value(row, c);
       result.known(row, c) = response.known(row, c);
     }
-  if (!(result.value.maxCoeff() > result.value.minCoeff()))
-    throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain",
-                                 result.response));
   result.multiplicative = result.value.minCoeff() > 0;
   result.y =
       result.multiplicative ? MatrixXd((result.value.array() / result.known.array()).log()) : result.value;
@@ -245,7 +245,7 @@ void set_response(const Source& source, const Response& response, Observations& 
 
 }  // namespace
 
-Observations observe_campaign(const CampaignData& data, const ObservationChoice& choice) {
+Observations observe_runs(const CampaignData& data, const ObservationChoice& choice) {
   const Reduction reduction = reduce_runs(data, {});
   Source source{data, reduction, std::vector<std::size_t>(reduction.runs.size())};
   std::iota(source.order.begin(), source.order.end(), 0U);
@@ -276,6 +276,14 @@ Observations observe_campaign(const CampaignData& data, const ObservationChoice&
   add_derived_covariates(source, result);
   add_raw_covariates(source, result);
   if (result.response == "thrust" || result.response == "cell") add_courses(source, result);
+  return result;
+}
+
+Observations observe_campaign(const CampaignData& data, const ObservationChoice& choice) {
+  Observations result = observe_runs(data, choice);
+  if (!(result.value.maxCoeff() > result.value.minCoeff()))
+    throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain",
+                                 result.response));
   return result;
 }
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <set>
 
 #include <fmt/format.h>
@@ -15,11 +14,16 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kBeyond = 0.5;  // of a condition's range, on either side of what was seen
+constexpr double kBeyond = 0.5;                    // of a condition's range, on either side of what was seen
+constexpr double kSlowest = 0.6, kFastest = 1.15;  // of the usual speed
+constexpr std::size_t kMostConditions = 5;
 
+/// A run that could be made: a place, and what differs there from an ordinary run.
 struct Setting {
   std::map<std::string, double> covariates;
-  int row = 0;  // the run that it is a variation of
+  std::string location;
+  int like = 0;  // a run to take everything else from
+  bool in_tunnel = true;
 };
 
 double median(VectorXd values) {
@@ -29,7 +33,9 @@ double median(VectorXd values) {
 
 /// What a laboratory can set, a little beyond what was seen; never below zero where zero is a limit.
 std::pair<double, double> reach(const Covariate& covariate) {
-  const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff(), range = high - low;
+  const VectorXd values = covariate.value.col(0);
+  if (covariate.name == "speed_rpm") return {kSlowest * median(values), kFastest * median(values)};
+  const double low = values.minCoeff(), high = values.maxCoeff(), range = high - low;
   double least = low - kBeyond * range;
   if (low >= 0) least = std::max(least, 0.0);
   double most = high + kBeyond * range;
@@ -37,34 +43,52 @@ std::pair<double, double> reach(const Covariate& covariate) {
   return {least, most};
 }
 
+/// Conditions of either effect, and the speed: thrust tells what adds a force from what scales it.
 std::vector<const Covariate*> conditions_of(const Observations& observations, const Term& first,
                                             const Term& second) {
-  std::set<std::string> names;
+  std::set<std::string> names = {"speed_rpm"};
   for (const Term* term : {&first, &second})
     names.insert(term->effect->covariates.begin(), term->effect->covariates.end());
   std::vector<const Covariate*> result;
-  for (const std::string& name : names)
-    if (const Covariate* covariate = observations.find(name); covariate != nullptr && name != "run_order")
-      result.push_back(covariate);
+  for (const std::string& name : names) {
+    const Covariate* covariate = observations.find(name);
+    const bool can_be_set = covariate != nullptr && !covariate->derived && !covariate->per_channel();
+    if (can_be_set && !covariate->value.array().isNaN().any()) result.push_back(covariate);
+  }
+  if (result.size() > kMostConditions) result.resize(kMostConditions);
   return result;
 }
 
-/// Every combination of low, median and high of the conditions that the two effects depend on, at a run of
-/// each group that differs in the sign of what came before it.
-std::vector<Setting> reachable(const Observations& observations,
-                               const std::vector<const Covariate*>& conditions,
-                               const std::vector<int>& rows) {
+/// An ordinary run at every location, and in open space where the campaign is in a tunnel.
+std::vector<Setting> ordinary_runs(const Observations& observations,
+                                   const std::vector<const Covariate*>& conditions) {
   std::vector<Setting> settings;
   std::set<int> groups;
-  for (const int row : rows)
-    if (groups.insert(observations.group[static_cast<std::size_t>(row)]).second)
-      settings.push_back({{}, row});
+  for (int row = 0; row < static_cast<int>(observations.rows()); ++row) {
+    const int group = observations.group[static_cast<std::size_t>(row)];
+    if (groups.insert(group).second)
+      settings.push_back({{},
+                          observations.group_name[static_cast<std::size_t>(group)],
+                          row,
+                          observations.in_tunnel[static_cast<std::size_t>(row)]});
+  }
+  const bool all_in_tunnel =
+      std::all_of(settings.begin(), settings.end(), [](const Setting& s) { return s.in_tunnel; });
+  if (all_in_tunnel && observations.in_tunnel[0]) settings.push_back({{}, "OS", 0, false});
+  for (Setting& setting : settings)
+    for (const Covariate* condition : conditions)
+      setting.covariates[condition->name] = median(condition->value.col(0));
+  return settings;
+}
+
+/// Every combination of low, usual and high of the conditions.
+std::vector<Setting> variations(const Setting& ordinary, const std::vector<const Covariate*>& conditions) {
+  std::vector<Setting> settings = {ordinary};
   for (const Covariate* condition : conditions) {
     const auto [least, most] = reach(*condition);
-    const double middle = median(condition->value.col(0));
     std::vector<Setting> more;
     for (const Setting& setting : settings)
-      for (const double value : {least, middle, most}) {
+      for (const double value : {setting.covariates.at(condition->name), least, most}) {
         more.push_back(setting);
         more.back().covariates[condition->name] = value;
       }
@@ -73,28 +97,21 @@ std::vector<Setting> reachable(const Observations& observations,
   return settings;
 }
 
-/// Observations whose runs are the settings: each its template with other conditions.
+/// Observations whose runs are the settings; steps that came before the campaign's end have happened.
 Observations imagined(const Observations& observations, const std::vector<Setting>& settings) {
   Observations result = observations;
   std::vector<int> rows;
-  for (const Setting& setting : settings) rows.push_back(setting.row);
-  const auto pick = [&](auto& values) {
-    auto copy = values;
-    copy.clear();
-    for (const int row : rows) copy.push_back(values[static_cast<std::size_t>(row)]);
-    values = copy;
-  };
+  for (const Setting& setting : settings) rows.push_back(setting.like);
   result.y = MatrixXd(observations.y(rows, Eigen::all));
-  result.value = MatrixXd(observations.value(rows, Eigen::all));
-  result.known = MatrixXd(observations.known(rows, Eigen::all));
-  result.duration_s = VectorXd(observations.duration_s(rows));
+  result.duration_s = VectorXd::Zero(static_cast<Index>(rows.size()));
   result.shape.clear();
-  pick(result.group);
-  pick(result.block);
-  pick(result.in_tunnel);
   result.previous.assign(rows.size(), -1);
+  result.in_tunnel.clear();
+  for (const Setting& setting : settings) result.in_tunnel.push_back(setting.in_tunnel);
   for (Covariate& covariate : result.covariates) {
+    const double last = covariate.name == "run_order" ? covariate.value.maxCoeff() : 0;
     covariate.value = MatrixXd(covariate.value(rows, Eigen::all));
+    if (covariate.name == "run_order") covariate.value.setConstant(last);
     for (std::size_t s = 0; s < settings.size(); ++s)
       if (const auto set = settings[s].covariates.find(covariate.name); set != settings[s].covariates.end())
         covariate.value.row(static_cast<Index>(s)).setConstant(set->second);
@@ -102,32 +119,47 @@ Observations imagined(const Observations& observations, const std::vector<Settin
   return result;
 }
 
-/// What a term adds, less what the group's constant would take of it.
-MatrixXd beyond_the_constant(const Observations& observations, const Observations& at, const Term& term,
-                             const MatrixXd& predicted, const MatrixXd& predicted_at,
-                             const std::vector<int>& rows) {
-  // The settings' medians differ from the campaign's: the reference is the campaign's, which a constant makes
-  // good.
-  const MatrixXd seen = respond(term, observations, predicted).value[0];
-  MatrixXd result = respond(term, at, predicted_at).value[0];
-  for (Index s = 0; s < result.rows(); ++s) {
-    Eigen::RowVectorXd mean = Eigen::RowVectorXd::Zero(result.cols());
-    double count = 0;
-    for (const int row : rows) {
-      if (observations.group[static_cast<std::size_t>(row)] != at.group[static_cast<std::size_t>(s)])
-        continue;
-      mean += seen.row(row);
-      ++count;
-    }
-    if (count > 0) result.row(s) -= mean / count;
+/// Forces there: those of the run that the setting is like, at its speed.
+MatrixXd forces_at(const Observations& observations, const MatrixXd& predicted,
+                   const std::vector<Setting>& settings) {
+  MatrixXd result(static_cast<Index>(settings.size()), predicted.cols());
+  const Covariate* speed = observations.find("speed_rpm");
+  for (std::size_t s = 0; s < settings.size(); ++s) {
+    result.row(static_cast<Index>(s)) = predicted.row(settings[s].like);
+    const auto set = settings[s].covariates.find("speed_rpm");
+    if (speed != nullptr && set != settings[s].covariates.end())
+      result.row(static_cast<Index>(s)) *= std::pow(set->second / median(speed->value.col(0)), 2);
   }
   return result;
 }
 
-std::string in_words(const Setting& setting, const std::string& location, double sigma) {
-  std::string text = "a run at " + location;
-  for (const auto& [name, value] : setting.covariates) text += fmt::format(", {} = {:.4g}", name, value);
-  return text + fmt::format(": the two predictions differ by {:.1f} σ of one run", sigma);
+/// Difference of the two effects' predictions, every setting against the ordinary run before it, in σ of such
+/// a pair.
+VectorXd distances(const Observations& observations, const Term& first, const Term& second,
+                   const JointFit& fit, const std::vector<Setting>& settings,
+                   const std::vector<std::size_t>& ordinary, const std::vector<int>& rows) {
+  const Observations at = imagined(observations, settings);
+  const MatrixXd forces = forces_at(observations, predict_response(observations, fit.model, rows), settings);
+  MatrixXd difference = respond(first, at, forces).value[0] - respond(second, at, forces).value[0];
+  const MatrixXd usual = difference(std::vector<Index>(ordinary.begin(), ordinary.end()), Eigen::all);
+  difference -= usual;
+  const MixedModel mixed(observations, rows, {0});
+  const MatrixXd by_mode = difference * mixed.mode_matrix();
+  VectorXd squares = VectorXd::Zero(by_mode.rows());
+  for (std::size_t k = 0; k < mixed.strata().size(); ++k) {
+    const MixedModel::Stratum& stratum = mixed.strata()[k];
+    if (!stratum.means()) continue;
+    const double variance = 2 * std::max(std::pow(fit.variances.sigma[k], 2), 1e-300);
+    squares += by_mode.middleCols(stratum.first_mode, stratum.modes).rowwise().squaredNorm() / variance;
+  }
+  return squares.cwiseSqrt();
+}
+
+std::string in_words(const SeparatingRun& run) {
+  std::string text = "a run at " + run.location;
+  for (const auto& [name, value] : run.setting) text += fmt::format(", {} = {:.4g}", name, value);
+  return text + fmt::format(", beside an ordinary one there: the predictions differ by {:.1f} σ",
+                            run.expected_sigma);
 }
 
 }  // namespace
@@ -136,37 +168,28 @@ std::optional<SeparatingRun> separating_run(const Observations& observations, co
                                             const Term& second, const JointFit& fit,
                                             const std::vector<int>& rows) {
   const std::vector<const Covariate*> conditions = conditions_of(observations, first, second);
-  if (conditions.empty() || conditions.size() > 5) return {};
-  const std::vector<Setting> settings = reachable(observations, conditions, rows);
-  Observations at = imagined(observations, settings);
-  const MatrixXd predicted = predict_response(observations, fit.model, rows);
-  std::vector<int> templates;
-  for (const Setting& setting : settings) templates.push_back(setting.row);
-  const MatrixXd predicted_at = predicted(templates, Eigen::all);
-  const MatrixXd difference = beyond_the_constant(observations, at, first, predicted, predicted_at, rows) -
-                              beyond_the_constant(observations, at, second, predicted, predicted_at, rows);
-  const MixedModel mixed(observations, rows, {0});
-  const MatrixXd by_mode = difference * mixed.mode_matrix();
+  if (conditions.empty()) return {};
+  std::vector<Setting> settings;
+  std::vector<std::size_t> ordinary;  // the setting that each is compared with
+  for (const Setting& usual : ordinary_runs(observations, conditions)) {
+    const std::size_t at = settings.size();
+    for (Setting& setting : variations(usual, conditions)) settings.push_back(std::move(setting));
+    ordinary.resize(settings.size(), at);
+  }
+  const VectorXd distance = distances(observations, first, second, fit, settings, ordinary, rows);
   SeparatingRun best;
-  std::size_t chosen = 0;
-  for (Index s = 0; s < by_mode.rows(); ++s) {
-    double distance2 = 0;
-    for (std::size_t k = 0; k < mixed.strata().size(); ++k) {
-      const MixedModel::Stratum& stratum = mixed.strata()[k];
-      if (!stratum.means()) continue;
-      const double variance = std::pow(fit.variances.sigma[k], 2) * (1 + kRatios[fit.variances.ratio[k]]);
-      distance2 += by_mode.row(s).segment(stratum.first_mode, stratum.modes).squaredNorm() /
-                   std::max(variance, 1e-300);
-    }
-    if (!std::isfinite(distance2) || std::sqrt(distance2) <= best.expected_sigma) continue;
-    best.expected_sigma = std::sqrt(distance2);
-    chosen = static_cast<std::size_t>(s);
+  for (std::size_t s = 0; s < settings.size(); ++s) {
+    const double sigma = distance(static_cast<Index>(s));
+    // Fewer conditions to set are worth a little distance: later combinations must be clearly better.
+    if (!std::isfinite(sigma) || sigma <= 1.05 * best.expected_sigma) continue;
+    best.expected_sigma = sigma;
+    best.location = settings[s].location;
+    best.setting.clear();
+    for (const auto& [name, value] : settings[s].covariates)
+      if (value != settings[ordinary[s]].covariates.at(name)) best.setting[name] = value;
   }
   if (!(best.expected_sigma > 0)) return {};
-  best.setting = settings[chosen].covariates;
-  best.location = observations.group_name[static_cast<std::size_t>(
-      observations.group[static_cast<std::size_t>(settings[chosen].row)])];
-  best.text = in_words(settings[chosen], best.location, best.expected_sigma);
+  best.text = in_words(best);
   return best;
 }
 

@@ -189,6 +189,10 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason = "no run stands in a tunnel";
   if (effect.name == "bidirectional" && observations.multiplicative)
     result.reason = "the response has one sign";
+  if (observations.coefficient && effect.name == "rotor_speed")
+    result.reason = "the measured speed is part of the response";
+  if (observations.coefficient && (effect.name == "nonlinearity" || effect.name == "bidirectional"))
+    result.reason = "a coefficient is no force that a cell has read";
   if (effect.needs_previous && observations.blocks_are_rows) result.reason = "the rows have no order";
   return result;
 }

@@ -139,8 +139,10 @@ TEST(Locations, CovarianceIsSymmetricAndHoldsTheVariances) {
 TEST(ReductionOutput, CsvColumnsAreInTheirOrderAndEmptyMeansNotKnown) {
   const CampaignData data = given_thrusts(
       "R1,OT,1,S1,2026-03-02T08:00Z,,7,7,7,7,20,,,\nR2,OS,1,S2,2026-03-02T08:00Z,,7,7,7,7,20,,,\n");
-  const Summary summary = summarize_locations(data, reduce_runs(data, {}));
-  const Sheet sheet = parse_csv(locations_csv(summary, data.info.rig, Convention::kThesis), "out.csv");
+  const Reduction reduction = reduce_runs(data, {});
+  const Summary summary = summarize_locations(data, reduction);
+  const Sheet sheet =
+      parse_csv(locations_csv(summary, reduction, data.info.rig, Convention::kThesis), "out.csv");
   EXPECT_EQ(sheet.columns[0] + sheet.columns[4] + sheet.columns[9], "locationc_tu_percent_u95");
   EXPECT_EQ(sheet.text(0, "c_t_std"), "") << "one run has no standard deviation";
   EXPECT_EQ(sheet.text(1, "y_norm"), "");

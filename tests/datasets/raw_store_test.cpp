@@ -51,8 +51,15 @@ TEST_F(RawStore, GivesBackFramesAndGapsInOrder) {
   writer.commit(Ledger{.frames_emitted = 666, .frames_stored = 550, .frames_lost = 116});
   writer.frames(frames(550, 450));
   writer.gap(end);
-  const std::string hash = writer.finish(
-      RunState::kComplete, Ledger{.frames_emitted = 1121, .frames_stored = 1000, .frames_lost = 121});
+  const std::string hash = writer.finish(RunState::kComplete, Ledger{.frames_emitted = 1121,
+                                                                     .frames_stored = 1000,
+                                                                     .frames_lost = 121,
+                                                                     .board_rate_hz = 1333.3357,
+                                                                     .rate_interval_hz = 0.0004,
+                                                                     .drift_ppm_h = 0.31,
+                                                                     .drift_interval_ppm_h = 2.1,
+                                                                     .end_reason = "complete",
+                                                                     .source = "usb"});
 
   const RawRun run = raw_run(file, "R1").value();
   EXPECT_EQ(run.frames, 1000u);
@@ -65,7 +72,14 @@ TEST_F(RawStore, GivesBackFramesAndGapsInOrder) {
   EXPECT_EQ(notes.gaps[0], std::make_pair(std::size_t{250}, middle));
   EXPECT_EQ(notes.gaps[1], std::make_pair(std::size_t{250}, reboot));
   EXPECT_EQ(notes.gaps[2], std::make_pair(std::size_t{1000}, end));
-  EXPECT_TRUE(ledger_of(file, run.id)->closed());
+  const Ledger ledger = ledger_of(file, run.id).value();
+  EXPECT_TRUE(ledger.closed());
+  EXPECT_EQ(ledger.board_rate_hz, 1333.3357);
+  EXPECT_EQ(ledger.rate_interval_hz, 0.0004);
+  EXPECT_EQ(ledger.drift_ppm_h, 0.31);
+  EXPECT_EQ(ledger.drift_interval_ppm_h, 2.1);
+  EXPECT_EQ(ledger.end_reason, "complete");
+  EXPECT_EQ(ledger.source, "usb");
 }
 
 TEST_F(RawStore, BlobsHoldATenthOfASecondAtMost) {

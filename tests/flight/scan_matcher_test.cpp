@@ -76,6 +76,7 @@ TEST_P(MatcherProperty, FindsThePositionWithinItsOwnCovariance) {
   std::uniform_real_distribution<double> uniform(-1, 1);
   constexpr int kMatches = 60;
   double nees = 0;
+  int rejected = 0;
   for (int i = 0; i < kMatches; ++i) {
     const SectionPoint at(given.reach_m * uniform(random), given.reach_m * uniform(random));
     // Known tilts about all three axes, and a rotation that only the scan shows
@@ -84,15 +85,20 @@ TEST_P(MatcherProperty, FindsThePositionWithinItsOwnCovariance) {
     Scan scan = lidar.sweep({at, {imu.roll_rad + rotation, imu.pitch_rad, imu.yaw_rad}});
     block(scan, static_cast<std::size_t>(150 + 100 * uniform(random)), blocked);
     const Match match = matcher.match(scan, imu);
-    ASSERT_TRUE(match.accepted) << text(match.reason) << " at " << at.transpose() << ", quality "
-                                << match.quality;
+    if (!match.accepted) {
+      ++rejected;
+      continue;
+    }
     const SectionPoint error = match.position_m - at;
     EXPECT_LT(error.norm(), 0.05) << at.transpose();
     if (turned) {
       EXPECT_NEAR(match.rotation_rad, rotation, 0.03);
     }
-    nees += error.dot(match.covariance_m2.inverse() * error) / kMatches;
+    nees += error.dot(match.covariance_m2.inverse() * error);
   }
+  // A fifth of the sight is the most that may be hidden, so that noise decides now and then.
+  EXPECT_LE(rejected, blocked > 0 ? 4 : 0);
+  nees /= kMatches - rejected;
   // Chi-square with 2 × 60 degrees of freedom: 99.99 % lie between 1.14 and 3.12; whole millimetres, corners
   // and many edges for a curve add a little to the upper end.
   EXPECT_GT(nees, 1.14);

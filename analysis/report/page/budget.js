@@ -9,14 +9,15 @@ const sources = {
   tare: 'zero (tares)',
   speed: 'tachometer',
   temperature: 'thermometer',
-  pressure: 'barometer'
+  pressure: 'barometer',
+  model: 'adopted effects'
 };
 
 const budgetColours = () =>
     (isDark() ?
-         ['#56b4e9', '#e69f00', '#3fcf9f', '#e39ac4', '#f0e442', '#e8743b', '#c9ccd1', '#8fa3ff', '#b08968'] :
-         ['#0072b2', '#b97a00', '#00855f', '#a03f90', '#7a7000', '#c2410c', '#5f6770', '#3d4fd1', '#7b5230']);
-const patterns = ['', '', '', '', '/', '\\', '.', 'x', '-'];
+         ['#56b4e9', '#e69f00', '#3fcf9f', '#e39ac4', '#f0e442', '#e8743b', '#c9ccd1', '#8fa3ff', '#b08968', '#5ad0d6'] :
+         ['#0072b2', '#b97a00', '#00855f', '#a03f90', '#7a7000', '#c2410c', '#5f6770', '#3d4fd1', '#7b5230', '#0b7a80']);
+const patterns = ['', '', '', '', '/', '\\', '.', 'x', '-', '|'];
 
 const usedSources = (locations) =>
     Object.keys(sources).filter((source) => locations.some((l) => l.c_t_budget[source] > 0));

@@ -74,6 +74,9 @@ function table(title, columns, rows) {
 const code = (line) =>
     h('code', {}, line.split(' ').flatMap((word, i) => [i ? ' ' : '', h('span', {class: 'word'}, word)]));
 
+/** A word that stands for a verdict; kinds: ok, note, problem. */
+const badge = (kind, text) => h('span', {class: `badge ${kind}`}, text);
+
 /** "Numbers: tunnelrig reduce …": what makes the numbers again. */
 const remade = (line) => h('span', {class: 'remade'}, 'Numbers: ', code(line));
 

@@ -1,6 +1,7 @@
-// The page: its sections in their order. One whose data are absent says why.
+// The page: its sections in their order. One whose data are absent says why; only a model need not be there.
 
 const campaignSections = [
+  {id: 'model', title: 'What the model lacked: error before and after', build: modelSection},
   {id: 'maps', title: 'Disturbance maps', build: mapsSection},
   {id: 'locations', title: 'C_T by location', build: locationsSection},
   {id: 'open_space', title: 'The tunnel against open space', build: openSpaceSection},
@@ -29,7 +30,8 @@ const contents = (sections) =>
     h('nav', {'aria-label': 'Contents'},
       h('ol', {}, sections.map(({id, title}) => h('li', {}, h('a', {href: `#${id}`}, prose(title))))));
 
-const sections = report.kind === 'table' ? tableSections : campaignSections;
+const sections = (report.kind === 'table' ? tableSections : campaignSections)
+                     .filter(({id, data = id}) => report.sections[data]);
 document.getElementById('head').replaceChildren(...head(), contents(sections));
 document.getElementById('main').replaceChildren(...sections.map(section));
 startPlots();

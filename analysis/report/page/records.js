@@ -1,7 +1,5 @@
 // Findings, the table of locations, and where everything came from.
 
-const badge = (kind, text) => h('span', {class: `badge ${kind}`}, text);
-
 function findingItem({severity, check, found, advice}) {
   const todo = advice ? h('div', {class: 'advice'}, '→ ', prose(advice)) : [];
   return h('li', {}, badge(severity, severity), ' ', h('strong', {}, check), ' ', prose(found), todo);

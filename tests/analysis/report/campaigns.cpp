@@ -195,4 +195,18 @@ void make_table(const std::filesystem::path& db, bool with_thrust) {
   store_table(parse_csv(csv, "table.csv"), parse_table_schema(schema, "table.toml"), db, false);
 }
 
+nlohmann::ordered_json explanation(const std::string& verdict) {
+  return nlohmann::ordered_json::parse(
+             R"({"format": "tunnelrig-explain/1", "campaign": "c", "response": "thrust",
+    "unit": "N", "baseline": "thesis", "verdict": "?", "noise_floor": 0.021, "blocks": 18, "runs": 215,
+    "before": {"rmse": 0.06, "held_out_rmse": 0.062, "held_out_ci95": [0.05, 0.08]},
+    "after": {"rmse": 0.02, "held_out_rmse": 0.022, "held_out_ci95": [0.018, 0.026]},
+    "adopted": [{"effect": "creep", "form": "", "rotor": 2, "p_value": 0.001, "held_out_gain": 0.04,
+      "parameters": {"amplitude": {"value": 0.02, "ci95": [0.018, 0.022], "unit": "1", "theory": false}},
+      "confounded_with": ["motor_warm_up"],
+      "separating_run": {"setting": {}, "location": "OS", "expected_sigma": 4.2, "text": "a run at OS"}}],
+    "unknown": [], "untestable": [], "suspect_rows": [], "detectable_at_80_percent_power": 0.01, "warnings": []})")
+      .patch({{{"op", "replace"}, {"path", "/verdict"}, {"value", verdict}}});
+}
+
 }  // namespace tunnelrig::test

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <string>
 
+#include <nlohmann/json.hpp>
+
 namespace tunnelrig::test {
 
 /// What a campaign of these tests has: everything, unless a test takes something away.
@@ -26,5 +28,8 @@ void make_campaign(const std::filesystem::path& db, const CampaignParts& parts =
 
 /// A table of two propellers at four speeds; its rows are worth a C_T where `with_thrust`.
 void make_table(const std::filesystem::path& db, bool with_thrust = true);
+
+/// What a stored model holds of its explanation, with a verdict.
+nlohmann::ordered_json explanation(const std::string& verdict);
 
 }  // namespace tunnelrig::test

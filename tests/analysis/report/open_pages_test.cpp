@@ -55,6 +55,12 @@ TEST(ReportPage, OpensInABrowser) {
   pages.campaign("hostile", {.columns = 1, .rows = 3, .source = "virtual", .odd_label = "</script><b>%{x}"});
   pages.campaign("uncalibrated", {.calibrated = false});
   pages.campaign("open_space_only", {.tunnel = false});
+  {
+    CampaignFile file(pages.folder / "whole.db", CampaignFile::Access::kWrite);
+    file.add_document("model", {"0", "tunnelrig explain --adopt", "{}"},
+                      nlohmann::json{{"explanation", test::explanation("confounded")}}.dump());
+  }
+  pages.add("whole");  // once more, with a model
   pages.campaign("one_rotor", {.raw_data = false, .rotors = 1});
   pages.campaign("one_run", {.raw_data = false, .open_space = false, .columns = 1, .rows = 1, .repeats = 1});
   test::make_table(pages.folder / "table.db");

@@ -32,7 +32,7 @@ struct ReportTest : testing::Test {
                               .program_version = "0",
                               .arguments = "tunnelrig report",
                               .created_utc = "2026-03-02T08:00:00Z",
-                              .terms = terms});
+                              .model = {terms, {}}});
   }
   Json json(const CampaignParts& parts) const {
     make_campaign(db, parts);
@@ -222,6 +222,22 @@ TEST_F(ReportTest, ATermWithoutItsMeasurementIsAReason) {
   const ReportData data = report({.air_pressure = true});
   ASSERT_FALSE(data.absent.empty());
   EXPECT_THAT(data.absent[0].reason, HasSubstr("has no air_pressure_Pa"));
+}
+
+TEST_F(ReportTest, AdoptedModelsComeWithTheirExplanations) {
+  EXPECT_FALSE(json({.raw_data = false})["sections"].contains("model"));
+  {
+    CampaignFile file(db, CampaignFile::Access::kWrite);
+    for (const char* verdict : {"explained", "confounded"})
+      file.add_document("model", {"0", "tunnelrig explain --adopt", "{}"},
+                        Json{{"explanation", test::explanation(verdict)}}.dump());
+  }
+  const Json models = Json::parse(report().json)["sections"]["model"];
+  ASSERT_EQ(models.size(), 2u);
+  EXPECT_EQ(models[0]["version"], 2);
+  EXPECT_EQ(models[0]["arguments"], "tunnelrig explain --adopt");
+  EXPECT_EQ(models[0]["explanation"], test::explanation("confounded"));
+  EXPECT_EQ(models[1]["explanation"]["verdict"], "explained");
 }
 
 TEST_F(ReportTest, NothingToReportIsRefused) {

@@ -1,0 +1,167 @@
+#include "analysis/model/adopt.h"
+
+#include "analysis/residual/explanation_output.h"
+#include "calibration/distributions.h"
+#include "datasets/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kMostFolds = 24;  // of the jackknife behind the explanation's intervals
+
+ModelTerm model_term(const AdoptedEffect& adopted, const Observations& observations) {
+  ModelTerm term{.effect = adopted.term.effect,
+                 .rotor = adopted.term.rotor,
+                 .other = adopted.term.other,
+                 .at_theory = adopted.term.at_theory,
+                 .reference = reference_of(*adopted.term.effect, observations)};
+  for (std::size_t k = 0; k < adopted.parameters.size(); ++k) {
+    term.parameters.push_back(adopted.parameters[k].value);
+    term.units.push_back(adopted.parameters[k].unit);
+    if (term.effect->parameters[k].role == ParameterRole::kChangePoint) {
+      const double row =
+          std::clamp(adopted.parameters[k].value, 0.0, static_cast<double>(observations.rows() - 1));
+      term.first_run = observations.name[static_cast<std::size_t>(std::ceil(row))];
+    }
+  }
+  return term;
+}
+
+const Covariate* covariate_of(const Observations& observations, const Curve& curve) {
+  return observations.find(curve.covariate == "start_utc" ? "hours_in_session" : curve.covariate);
+}
+
+ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Observations& observations) {
+  ModelCurve result{.covariate = curve.covariate,
+                    .rotor = curve.rotor,
+                    .low = curve.x.minCoeff(),
+                    .high = curve.x.maxCoeff(),
+                    .coefficients = {amplitude.data(), amplitude.data() + amplitude.size()}};
+  // The mean over the runs is the baseline's: without it the curve would shift every coefficient.
+  const Covariate& covariate = *covariate_of(observations, curve);
+  const Index rotor = std::max(curve.rotor, 0);
+  for (Index k = 1; k <= amplitude.size(); ++k) {
+    double sum = 0;
+    for (Index row = 0; row < observations.rows(); ++row)
+      sum += std::cos(std::numbers::pi * static_cast<double>(k) * (covariate.at(row, rotor) - result.low) /
+                      (result.high - result.low));
+    result.centre.push_back(sum / static_cast<double>(observations.rows()));
+  }
+  return result;
+}
+
+double jackknife_dof(const Observations& observations) {
+  return std::max(1, std::min(observations.blocks(), kMostFolds) - 1);
+}
+
+/// Whether the joint fit has a column for a parameter.
+bool has_column(const ModelTerm& term, std::size_t k) {
+  return term.effect->parameters[k].role != ParameterRole::kChangePoint && !(k == 0 && term.at_theory);
+}
+
+/// The joint fit at the explanation's model: amplitudes of its curves, and covariance of all its columns.
+AmplitudeFit joint_fit_of(const Observations& observations, const Explanation& explanation) {
+  std::vector<int> rows(static_cast<std::size_t>(observations.rows()));
+  std::iota(rows.begin(), rows.end(), 0);
+  const JointFit fit = fit_jointly(observations, explanation.model, rows);
+  const Components y = difference(response_components(observations), fit.linear.offset);
+  return fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);
+}
+
+/// Where the model's parameters stand among the joint fit's columns (−1: nowhere), and their standard
+/// uncertainty.
+struct Placed {
+  std::vector<Index> column;
+  std::vector<double> uncertainty;
+};
+
+MatrixXd covariance_of(const Placed& placed, const MatrixXd& columns) {
+  const auto size = static_cast<Index>(placed.column.size());
+  MatrixXd covariance = MatrixXd::Zero(size, size);
+  for (Index i = 0; i < size; ++i)
+    for (Index j = 0; j < size; ++j) {
+      const Index a = placed.column[static_cast<std::size_t>(i)],
+                  b = placed.column[static_cast<std::size_t>(j)];
+      const double both =
+          placed.uncertainty[static_cast<std::size_t>(i)] * placed.uncertainty[static_cast<std::size_t>(j)];
+      if (i == j) covariance(i, j) = both;
+      if (i == j || a < 0 || b < 0) continue;
+      const double correlation = columns(a, b) / std::sqrt(columns(a, a) * columns(b, b));
+      if (std::isfinite(correlation)) covariance(i, j) = both * std::clamp(correlation, -1.0, 1.0);
+    }
+  return covariance;
+}
+
+/// Curves of runs' means stand where the model has a column of values for them.
+bool acts_on_means(const Curve& curve) { return curve.x.size() > 0; }
+
+}  // namespace
+
+void require_adoptable(const Observations& observations) {
+  if (observations.response != "thrust" ||
+      (observations.baseline != "thesis" && observations.baseline != "open_space"))
+    throw InputError(
+        fmt::format("--adopt: a model corrects the thrusts of a campaign, and this explains {} of {}",
+                    observations.response, observations.campaign));
+}
+
+Adoption adopt(const Observations& observations, const Explanation& explanation, bool empirical) {
+  require_adoptable(observations);
+  Adoption result;
+  ModelVersion model{.baseline = observations.baseline,
+                     .multiplicative = observations.multiplicative,
+                     .dof = jackknife_dof(observations),
+                     .explanation = explanation_json(explanation)};
+  const bool curves_wanted = empirical && !explanation.model.curves.empty();
+  if (explanation.adopted.empty() && !curves_wanted) {
+    if (!explanation.unknown.empty())
+      result.notes.emplace_back("what was found has no name; --adopt-empirical adopts it as a curve");
+    return result;
+  }
+  const AmplitudeFit fit = joint_fit_of(observations, explanation);
+  const double to_standard = 1 / (2 * student_t_quantile(0.975, model.dof));
+  Placed placed;
+  Index column = 0;
+  for (const AdoptedEffect& adopted : explanation.adopted) {
+    model.terms.push_back(model_term(adopted, observations));
+    for (std::size_t k = 0; k < adopted.parameters.size(); ++k) {
+      const bool has = has_column(model.terms.back(), k);
+      placed.column.push_back(has ? column++ : -1);
+      placed.uncertainty.push_back(
+          has ? (adopted.parameters[k].high - adopted.parameters[k].low) * to_standard : 0);
+    }
+    if (!adopted.confounded_with.empty())
+      result.notes.push_back(fmt::format("{} is adopted, and these data cannot tell it from {}",
+                                         adopted.term.label(), fmt::join(adopted.confounded_with, ", ")));
+  }
+  for (const Curve& curve : explanation.model.curves) {
+    const auto bends = static_cast<Index>(curve.columns.size());
+    if (curves_wanted && acts_on_means(curve)) {
+      model.curves.push_back(model_curve(curve, fit.amplitude.segment(column, bends), observations));
+      for (Index k = column; k < column + bends; ++k) {
+        placed.column.push_back(k);
+        placed.uncertainty.push_back(std::sqrt(std::max(0.0, fit.covariance(k, k))));
+      }
+    } else {
+      result.notes.push_back(fmt::format("the curve over {} is not adopted{}", curve.label(),
+                                         acts_on_means(curve) ? "; --adopt-empirical does that"
+                                                              : ": it leaves the runs' means as they are"));
+    }
+    column += bends;
+  }
+  if (model.terms.empty() && model.curves.empty()) return result;
+  model.covariance = covariance_of(placed, fit.covariance);
+  result.model = std::move(model);
+  return result;
+}
+
+}  // namespace tunnelrig

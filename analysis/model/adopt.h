@@ -1,0 +1,26 @@
+// From an explanation to a version of the model.
+#pragma once
+
+#include "analysis/model/model_version.h"
+#include "analysis/residual/explanation.h"
+
+#include <optional>
+
+namespace tunnelrig {
+
+/// What was adopted, and what could not be, in words.
+struct Adoption {
+  std::optional<ModelVersion> model;  // without a number yet; nothing where there is nothing to adopt
+  std::vector<std::string> notes;
+};
+
+/// Throws InputError unless the explanation is of a campaign's thrusts, which are what a model corrects; for
+/// what is asked of `adopt`, before hours are spent on an explanation.
+void require_adoptable(const Observations& observations);
+
+/// The accepted effects, and with `empirical` the curves that have no name. Variances of effects are those of
+/// the explanation's 95 % intervals, correlations those of the linearised joint fit; what theory gives has
+/// none.
+Adoption adopt(const Observations& observations, const Explanation& explanation, bool empirical);
+
+}  // namespace tunnelrig

@@ -1,0 +1,62 @@
+// A version of the model: the thesis's, and the effects that were adopted on top of it.
+#pragma once
+
+#include "analysis/effects/effect.h"
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace tunnelrig {
+
+/// An adopted effect with its parameters.
+struct ModelTerm {
+  const Effect* effect = nullptr;
+  int rotor = -1;                  // from 0; −1: all alike
+  int other = -1;                  // crosstalk: the rotor that leaks in
+  bool at_theory = false;          // the amplitude is known physics
+  std::vector<double> parameters;  // all of the effect's; of a change-point the run's name counts instead
+  std::vector<std::string> units;  // of the parameters
+  std::vector<double> reference;   // of the covariates, as they were when the effect was adopted
+  std::string first_run;           // where the effect has a change-point
+
+  std::string label() const;  // "creep of rotor 2"
+};
+
+/// A curve without a name: y changes by Σ a_k (cos(π k u) − centre_k), u from 0 at `low` to 1 at `high` and
+/// held there beyond.
+struct ModelCurve {
+  std::string covariate;
+  int rotor = -1;
+  double low = 0, high = 1;
+  std::vector<double> coefficients, centre;
+
+  std::string label() const;  // "curve over relative_humidity (empirical)"
+};
+
+struct ModelVersion {
+  int version = 0, parent = 0;  // 0 is the thesis's model
+  std::string baseline = "thesis";
+  bool multiplicative = true;  // effects multiply (y is a logarithm), or add
+  std::vector<ModelTerm> terms;
+  std::vector<ModelCurve> curves;
+  Eigen::MatrixXd covariance;  // of parameters()
+  double dof = std::numeric_limits<double>::infinity();
+  std::string explanation;  // JSON of the explanation that it comes from
+
+  /// All terms' parameters, then all curves' coefficients.
+  Eigen::VectorXd parameters() const;
+  std::vector<std::string> effects() const;  // labels
+  std::string name() const;                  // "version 2 (creep, supply_voltage)"
+};
+
+/// "tunnelrig-model/1".
+std::string model_json(const ModelVersion& model);
+
+/// Throws InputError, naming `source` and the key, for what is no such document and for an effect that this
+/// program does not have.
+ModelVersion model_from_json(const std::string& json, const std::string& source);
+
+}  // namespace tunnelrig

@@ -1,0 +1,115 @@
+// What an explanation says, in words and with its errors: of the explanation's own page, and of the report
+// where a model was adopted.
+
+/** "0.0123": three digits of anything. */
+function digits(value, n = 3) {
+  if (!known(value)) return '–';
+  const size = Math.abs(value);
+  const text = size !== 0 && (size < 1e-4 || size >= 1e6) ? size.toExponential(n - 1) :
+                                                            String(Number(size.toPrecision(n)));
+  return (value < 0 ? '−' : '') + text;
+}
+
+const bracket = ([low, high]) => `[${digits(low)}, ${digits(high)}]`;
+const unitSuffix = (unit) => (unit && unit !== '1' ? ` ${unit}` : '');
+const unitBracket = (unit) => (unit === '' ? '' : ` [${unit === '1' ? '–' : unit}]`);
+
+const effectLabel = ({effect, form, rotor, from_rotor: from}) => effect + (form ? ` (${form})` : '') +
+    (from ? ` from rotor ${from}` : '') + (rotor ? ` ${from ? 'to' : 'of'} rotor ${rotor}` : '');
+
+function drawErrors({before, after, noise_floor: floor, unit}) {
+  const names = ['noise floor', 'after', 'before'];
+  const colours = rotorColours();
+  const dot = (y, error, colour, symbol) => ({
+    type: 'scatter',
+    mode: 'markers',
+    name: y,
+    x: [error.held_out_rmse],
+    y: [y],
+    error_x: {
+      type: 'data',
+      symmetric: false,
+      array: [error.held_out_ci95[1] - error.held_out_rmse],
+      arrayminus: [error.held_out_rmse - error.held_out_ci95[0]],
+      color: colour,
+      thickness: 2,
+      width: 8
+    },
+    marker: {color: colour, size: 13, symbol},
+    hovertemplate: `${y}: ${digits(error.held_out_rmse, 4)} ${bracket(error.held_out_ci95)}${
+        unitSuffix(unit)}<extra></extra>`
+  });
+  const floorDot = {
+    type: 'scatter',
+    mode: 'markers',
+    x: [floor],
+    y: ['noise floor'],
+    marker: {color: style('--ink'), size: 13, symbol: 'diamond'},
+    hovertemplate: `noise floor: ${digits(floor, 4)}${unitSuffix(unit)}<extra></extra>`
+  };
+  const line = {
+    type: 'line',
+    yref: 'paper',
+    y0: 0,
+    y1: 1,
+    x0: floor,
+    x1: floor,
+    line: {color: style('--ink'), width: 1, dash: 'dot'}
+  };
+  return {
+    data: [floorDot, dot('after', after, colours[0], 'circle'), dot('before', before, colours[1], 'square')],
+    layout: {
+      xaxis: axis(`root mean square error on blocks held out${unitBracket(unit)}`, {rangemode: 'tozero'}),
+      yaxis: axis('', {type: 'category', categoryarray: names, categoryorder: 'array', range: [-0.5, 2.5]}),
+      shapes: [line],
+      showlegend: false
+    }
+  };
+}
+
+function errorFigure(explanation, made) {
+  const {before, after, noise_floor: floor, unit} = explanation;
+  const value = (error) =>
+      `${digits(error.held_out_rmse, 4)} ${bracket(error.held_out_ci95)}${unitSuffix(unit)}`;
+  const caption = sentences(
+      `Error on blocks held out: before ${value(before)}, after ${value(after)}; bars are 95 % intervals,`,
+      'by resampling the blocks. The noise floor,',
+      `${digits(floor, 4)}${unitSuffix(unit)}, is the error to expect of an exact model: scatter of runs`,
+      'and sessions, and the uncertainty of its coefficients.',
+      explanation.unknown.length &&
+          'Structure without a name is no part of the error after, but is allowed for in the floor.');
+  return figure(
+      'Held-out error', [],
+      plot('Held-out error before and after, and the noise floor', () => 230, () => drawErrors(explanation)),
+      caption, made);
+}
+
+const parameterTable = (adopted, unit) => {
+  const rows = adopted.flatMap(
+      (effect) => Object.entries(effect.parameters).map(([name, p]) => ({effect, name, ...p})));
+  return table(
+      'Parameters with 95 % intervals (jackknife over the blocks)',
+      [
+        {name: 'effect', cell: (r) => effectLabel(r.effect), text: true},
+        {name: 'parameter', cell: (r) => r.name, text: true},
+        {name: 'value', cell: (r) => digits(r.value, 4) + (r.theory ? ' (theory)' : '')},
+        {name: '95 % interval', cell: (r) => bracket(r.ci95)},
+        {name: 'unit', cell: (r) => (r.unit === '1' ? '–' : r.unit), text: true},
+        {name: 'p of the effect', cell: (r) => digits(r.effect.p_value)},
+        {name: `gain${unitBracket(unit)}`, cell: (r) => digits(r.effect.held_out_gain)},
+      ],
+      rows);
+};
+
+/** What cannot be told from an effect, and what would tell. */
+function confusionText({confounded_with: rivals, separating_run: run}) {
+  if (!rivals.length) return 'Nothing else that was tried does as well on blocks that it has not seen.';
+  const list = rivals.map((name) => `\`${name}\``).join(', ');
+  const remedy =
+      run ? ` To tell them apart, make ${run.text}.` : ' No run within reach would tell them apart.';
+  return `These data cannot tell it from ${list}.${remedy}`;
+}
+
+const unknownText = ({covariate, rotor, amplitude, p_value: p}, unit) =>
+    `Depends on \`${covariate}\`${rotor ? ` at rotor ${rotor}` : ''}: amplitude ${digits(amplitude)}${
+        unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.`;

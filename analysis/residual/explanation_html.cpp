@@ -1,0 +1,288 @@
+// The explanation's page: what its scripts draw (analysis/report/page/explanation*.js), as one document.
+#include "analysis/report/render.h"
+#include "analysis/residual/explanation_output.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <set>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using Json = nlohmann::ordered_json;
+
+constexpr int kCoursePoints = 41;
+
+/// As many digits as a picture shows; what is not known is null.
+Json drawn(double value) {
+  return std::isfinite(value) ? Json(std::stod(fmt::format("{:.6g}", value))) : Json(nullptr);
+}
+
+Json drawn(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (const double value : values) list.push_back(drawn(value));
+  return list;
+}
+
+Json rotor_number(int rotor) { return rotor < 0 ? Json(nullptr) : Json(rotor + 1); }
+
+class Page {
+ public:
+  Page(const Explanation& explanation, const Observations& observations)
+      : explanation_(explanation),
+        observations_(observations),
+        rows_(static_cast<std::size_t>(observations.rows())),
+        before_(-explanation.residual_before),
+        after_(-explanation.residual_after) {
+    std::iota(rows_.begin(), rows_.end(), 0);
+    predicted_ = predict_response(observations, explanation.model, rows_);
+  }
+
+  Json runs() const {
+    Json json{{"name", observations_.name}, {"before", Json::array()}, {"after", Json::array()}};
+    for (const int row : rows_) {
+      const auto r = static_cast<std::size_t>(row);
+      json["location"].push_back(observations_.group_name[static_cast<std::size_t>(observations_.group[r])]);
+      json["block"].push_back(observations_.block[r]);
+    }
+    json["block_name"] = observations_.block_name;
+    for (Index c = 0; c < observations_.channels(); ++c) {
+      json["before"].push_back(column(before_, c));
+      json["after"].push_back(column(after_, c));
+    }
+    return json;
+  }
+
+  /// Each covariate of each effect and each structure without a name.
+  Json panels() const {
+    Json list = Json::array();
+    for (const AdoptedEffect& adopted : explanation_.adopted) add_effect(adopted, list);
+    for (const UnknownStructure& unknown : explanation_.unknown) add_unknown(unknown, list);
+    return list;
+  }
+
+  /// What happened within the runs, for effects that change with time.
+  Json courses() const {
+    Json list = Json::array();
+    if (observations_.shape.empty() || !observations_.multiplicative) return list;
+    std::set<int> done;
+    for (const AdoptedEffect& adopted : explanation_.adopted)
+      if (adopted.term.effect->within_time() && done.insert(adopted.term.rotor).second)
+        list.push_back(course(adopted.term.label(), adopted.term.rotor));
+    for (const UnknownStructure& unknown : explanation_.unknown)
+      if (unknown.covariate == "time_in_run" && done.insert(unknown.rotor).second)
+        list.push_back(course("time_in_run", unknown.rotor));
+    return list;
+  }
+
+  Json rounds(const std::vector<Round>& rounds, double alpha) const {
+    Json list = Json::array();
+    for (const Round& round : rounds) {
+      Json json{{"outcome", round.outcome},
+                {"observed", drawn(round.observed)},
+                {"critical", drawn(round.critical > 0 ? round.critical : critical(round, alpha))},
+                {"null_maxima", drawn(round.null_maxima)},
+                {"ranking", Json::array()}};
+      for (const Ranked& ranked : round.ranking) {
+        const EffectParameter& amplitude = ranked.term.effect->parameters[0];
+        json["ranking"].push_back({{"label", ranked.term.label()},
+                                   {"evidence", drawn(ranked.evidence)},
+                                   {"p", drawn(ranked.p)},
+                                   {"parameter", amplitude.name},
+                                   {"unit", unit_of(observations_, amplitude)},
+                                   {"amplitude", drawn(ranked.amplitude)},
+                                   {"standard_error", drawn(ranked.standard_error)}});
+      }
+      list.push_back(std::move(json));
+    }
+    return list;
+  }
+
+ private:
+  static double critical(const Round& round, double alpha) {
+    if (round.null_maxima.empty()) return 0;
+    std::vector<double> sorted = round.null_maxima;
+    std::sort(sorted.begin(), sorted.end());
+    const auto rank =
+        static_cast<std::size_t>(std::ceil((1 - alpha) * static_cast<double>(sorted.size() + 1))) - 1;
+    return sorted[std::min(rank, sorted.size() - 1)];
+  }
+
+  static Json column(const MatrixXd& values, Index c) {
+    Json list = Json::array();
+    for (Index row = 0; row < values.rows(); ++row) list.push_back(drawn(values(row, c)));
+    return list;
+  }
+
+  /// The part of what a term adds to y that a residual shows: without what the baseline can absorb.
+  MatrixXd visible(const MatrixXd& added) const {
+    const MixedModel mixed(observations_, rows_, {0});
+    Components components(1 + observations_.shape.size(), MatrixXd::Zero(added.rows(), added.cols()));
+    components[0] = added;
+    MatrixXd by_mode = MatrixXd::Zero(added.rows(), added.cols());
+    for (std::size_t s = 0; s < mixed.strata().size(); ++s) {
+      const MixedModel::Stratum& stratum = mixed.strata()[s];
+      if (!stratum.means()) continue;
+      Stacked stacked = mixed.stack(s, {&components});
+      mixed.project(s, 0, stacked);
+      by_mode.middleCols(stratum.first_mode, stratum.modes) =
+          Eigen::Map<const MatrixXd>(stacked.data(), added.rows(), stratum.modes);
+    }
+    return by_mode * mixed.mode_matrix().transpose();
+  }
+
+  /// Points of one covariate: the residual with everything else in, and what this term makes of it.
+  Json panel(const std::string& label, const std::string& covariate, const MatrixXd& x, int rotor,
+             const MatrixXd& fitted) const {
+    Json json{{"label", label}, {"covariate", covariate}, {"rotor", rotor_number(rotor)}};
+    for (Index c = 0; c < observations_.channels(); ++c) {
+      if (rotor >= 0 && c != rotor) continue;
+      for (const int row : rows_) {
+        const double at = x(row, x.cols() > 1 ? c : 0);
+        if (!std::isfinite(at) || !std::isfinite(after_(row, c))) continue;
+        json["run"].push_back(row);
+        json["channel"].push_back(c + 1);
+        json["x"].push_back(drawn(at));
+        json["before"].push_back(drawn(after_(row, c) + fitted(row, c)));
+        json["after"].push_back(drawn(after_(row, c)));
+        json["fitted"].push_back(drawn(fitted(row, c)));
+      }
+    }
+    return json;
+  }
+
+  void add_effect(const AdoptedEffect& adopted, Json& list) const {
+    const MatrixXd added = visible(respond(adopted.term, observations_, predicted_).value[0]);
+    const MatrixXd fitted =
+        observations_.multiplicative ? MatrixXd(added.array() * predicted_.array()) : added;
+    std::vector<std::string> names = adopted.term.effect->covariates;
+    if (names.empty()) names = {"run_order"};
+    for (const std::string& name : names) {
+      const Covariate* covariate = observations_.find(name);
+      if (covariate == nullptr || !(covariate->value.maxCoeff() > covariate->value.minCoeff())) continue;
+      list.push_back(panel(adopted.term.label(), name, covariate->value, adopted.term.rotor, fitted));
+    }
+  }
+
+  void add_unknown(const UnknownStructure& unknown, Json& list) const {
+    for (const Curve& curve : explanation_.model.curves) {
+      if (curve.covariate != unknown.covariate || curve.rotor != unknown.rotor || curve.x.size() == 0)
+        continue;
+      MatrixXd shape = MatrixXd::Zero(observations_.rows(), observations_.channels());
+      for (Index row = 0; row < shape.rows(); ++row)
+        for (Index c = 0; c < shape.cols(); ++c)
+          if (curve.rotor < 0 || c == curve.rotor)
+            shape(row, c) = interpolated(unknown.shape, curve.x(row, curve.x.cols() > 1 ? c : 0));
+      // Time of day is drawn by what the curve is of: hours since the session's first run.
+      const std::string name = curve.covariate == "start_utc" ? "hours_in_session" : curve.covariate;
+      list.push_back(panel("unknown: " + curve.label(), name, curve.x, curve.rotor, visible(shape)));
+      return;
+    }
+    if (unknown.covariate == "session") {
+      MatrixXd block(observations_.rows(), 1);
+      for (const int row : rows_) block(row, 0) = observations_.block[static_cast<std::size_t>(row)] + 1;
+      list.push_back(
+          panel("unknown: session", "session", block, -1, MatrixXd::Zero(after_.rows(), after_.cols())));
+    }
+  }
+
+  static double interpolated(const std::vector<ShapePoint>& shape, double x) {
+    if (x <= shape.front().x) return shape.front().y;
+    for (std::size_t p = 1; p < shape.size(); ++p) {
+      if (x > shape[p].x) continue;
+      const double share = (x - shape[p - 1].x) / (shape[p].x - shape[p - 1].x);
+      return shape[p - 1].y + share * (shape[p].y - shape[p - 1].y);
+    }
+    return shape.back().y;
+  }
+
+  /// Mean course over the runs with its 95 % band, and with the model's terms taken out; % of the run's mean.
+  Json course(const std::string& label, int rotor) const {
+    Components modelled(1 + observations_.shape.size(),
+                        MatrixXd::Zero(observations_.rows(), observations_.channels()));
+    for (const Term& term : explanation_.model.terms) {
+      const TermResponse response = respond(term, observations_, predicted_);
+      for (std::size_t k = 0; k < modelled.size(); ++k) modelled[k] += response.value[k];
+    }
+    Json json{{"label", label},
+              {"rotor", rotor_number(rotor)},
+              {"duration_s", drawn(observations_.duration_s.mean())}};
+    for (int p = 0; p < kCoursePoints; ++p) {
+      const double u = static_cast<double>(p) / (kCoursePoints - 1);
+      VectorXd measured = VectorXd::Zero(observations_.rows()), model = measured;
+      for (std::size_t j = 1; j < modelled.size(); ++j) {
+        const double cosine = 100 * std::cos(std::numbers::pi * static_cast<double>(j) * u);
+        measured += cosine * of_rotor(observations_.shape[j - 1], rotor);
+        model += cosine * of_rotor(modelled[j], rotor);
+      }
+      json["u"].push_back(drawn(u));
+      json["measured"].push_back(drawn(measured.mean()));
+      json["half"].push_back(drawn(half_width(measured)));
+      json["model"].push_back(drawn(model.mean()));
+      json["after"].push_back(drawn((measured - model).mean()));
+      json["after_half"].push_back(drawn(half_width(measured - model)));
+    }
+    return json;
+  }
+
+  static VectorXd of_rotor(const MatrixXd& values, int rotor) {
+    return rotor < 0 ? VectorXd(values.rowwise().mean()) : VectorXd(values.col(rotor));
+  }
+
+  static double half_width(const VectorXd& values) {
+    const double n = static_cast<double>(values.size());
+    return 1.96 * std::sqrt((values.array() - values.mean()).square().sum() / std::max(1.0, n - 1) / n);
+  }
+
+  const Explanation& explanation_;
+  const Observations& observations_;
+  std::vector<int> rows_;
+  MatrixXd before_, after_, predicted_;  // measured less predicted; forces
+};
+
+Json effects_of(const Explanation& explanation) {
+  Json list = Json::array();
+  for (const AdoptedEffect& adopted : explanation.adopted)
+    list.push_back({{"label", adopted.term.label()},
+                    {"formula", adopted.term.effect->formula},
+                    {"physics", adopted.term.effect->physics}});
+  return list;
+}
+
+}  // namespace
+
+std::string explanation_html(const Explanation& explanation, const Observations& observations,
+                             const SearchSettings& settings, const PageOrigin& origin) {
+  const Page page(explanation, observations);
+  const Json document{{"format", "tunnelrig-explanation-page/1"},
+                      {"made",
+                       {{"db", origin.db},
+                        {"program", "tunnelrig " + origin.program_version},
+                        {"arguments", origin.arguments},
+                        {"created_utc", origin.created_utc}}},
+                      {"settings",
+                       {{"alpha", settings.alpha},
+                        {"seed", settings.seed},
+                        {"simulations", settings.simulations},
+                        {"most_effects", settings.most_effects}}},
+                      {"explanation", Json::parse(explanation_json(explanation))},
+                      {"verdict_in_words", verdict_in_words(explanation.verdict)},
+                      {"effects", effects_of(explanation)},
+                      {"runs", page.runs()},
+                      {"panels", page.panels()},
+                      {"courses", page.courses()},
+                      {"rounds", page.rounds(explanation.rounds, settings.alpha)},
+                      {"curve_rounds", page.rounds(explanation.curve_rounds, settings.alpha)}};
+  // Paths need not be UTF-8.
+  return render_explanation(document.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+}  // namespace tunnelrig

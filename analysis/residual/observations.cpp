@@ -1,0 +1,32 @@
+#include "analysis/residual/observations.h"
+
+namespace tunnelrig {
+namespace {
+
+template <class T>
+std::vector<T> picked(const std::vector<T>& from, const std::vector<int>& rows) {
+  std::vector<T> result;
+  if (from.empty()) return result;
+  for (const int row : rows) result.push_back(from[static_cast<std::size_t>(row)]);
+  return result;
+}
+
+}  // namespace
+
+Observations Observations::subset(const std::vector<int>& kept) const {
+  Observations part = *this;
+  for (Eigen::MatrixXd* matrix : {&part.value, &part.known, &part.y, &part.slopes})
+    *matrix = Eigen::MatrixXd((*matrix)(kept, Eigen::all));
+  part.duration_s = Eigen::VectorXd(duration_s(kept));
+  for (Covariate& covariate : part.covariates)
+    covariate.value = Eigen::MatrixXd(covariate.value(kept, Eigen::all));
+  part.name = picked(name, kept);
+  part.group = picked(group, kept);
+  part.block = picked(block, kept);
+  part.in_tunnel = picked(in_tunnel, kept);
+  part.previous = picked(previous, kept);
+  part.held_out = picked(held_out, kept);
+  return part;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,289 @@
+#include "analysis/air.h"
+#include "analysis/residual/expression.h"
+#include "analysis/residual/observations.h"
+#include "datasets/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <set>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kAtRest = 0.05;  // of a group's highest speed
+
+/// The rows that are used, of the table.
+struct Source {
+  const ObservationTable& table;
+  std::vector<std::size_t> rows;
+
+  Index count() const { return static_cast<Index>(rows.size()); }
+  const Observation& row(Index r) const { return table.rows[rows[static_cast<std::size_t>(r)]]; }
+  double cell(Index r, const std::string& column) const {
+    return table.sheet.number(rows[static_cast<std::size_t>(r)], column).value_or(kNaN);
+  }
+};
+
+/// Leaves out rows whose motor stood.
+Source moving_rows(const ObservationTable& table, Observations& result) {
+  std::map<std::string, double> highest;
+  for (const Observation& row : table.rows)
+    highest[row.group] = std::max(highest[row.group], row.speed_rpm.value_or(0));
+  Source source{table, {}};
+  for (std::size_t r = 0; r < table.rows.size(); ++r) {
+    const Observation& row = table.rows[r];
+    if (row.speed_rpm && highest[row.group] > 0 && *row.speed_rpm <= kAtRest * highest[row.group]) continue;
+    source.rows.push_back(r);
+  }
+  const std::size_t resting = table.rows.size() - source.rows.size();
+  if (resting > 0) result.left_out.push_back(fmt::format("{} rows: the motor stood", resting));
+  return source;
+}
+
+/// A covariate's name: what it means where the schema says so, else its column.
+void add_covariates(const Source& source, Observations& result) {
+  const TableSchema& schema = source.table.schema;
+  const auto add = [&](const std::string& name, const auto& value_of) {
+    if (result.find(name) != nullptr) return;
+    Covariate covariate{name, MatrixXd(source.count(), 1)};
+    Index missing = 0;
+    for (Index r = 0; r < source.count(); ++r) {
+      covariate.value(r, 0) = value_of(r);
+      if (std::isnan(covariate.value(r, 0))) ++missing;
+    }
+    if (missing == source.count()) return;
+    if (missing > 0)
+      result.not_usable[name] = fmt::format("missing in {} of {} rows", missing, source.count());
+    result.covariates.push_back(std::move(covariate));
+  };
+  for (const TableColumn& column : schema.covariates) {
+    const Unit& unit = unit_from_name(column.unit);
+    add(column.meaning.empty() ? column.column : column.meaning,
+        [&](Index r) { return unit.convert(source.cell(r, column.column)); });
+  }
+  if (schema.speed_column) add("speed_rpm", [&](Index r) { return source.row(r).speed_rpm.value_or(kNaN); });
+  if (schema.diameter_column || schema.diameter_m)
+    add("propeller_diameter_m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); });
+  add("air_temperature_C", [&](Index r) { return source.row(r).air_temperature_C; });
+}
+
+void set_response(const Source& source, const ObservationChoice& choice, Observations& result) {
+  const TableColumn& column = source.table.schema.response;
+  const bool own = choice.response.empty() || choice.response == column.column;
+  result.response = own ? column.column : choice.response;
+  if (!own) source.table.sheet.require(choice.response);
+  result.unit = own ? (column.meaning == "thrust_N" ? "N" : column.unit) : "";
+  result.coefficient = own && column.meaning.starts_with("c_t");
+  const MatrixXd ones = MatrixXd::Ones(source.count(), 1);
+  result.value = result.known = ones;
+  // C_T is what is constant where speed and diameter are known; a baseline in another column replaces that.
+  const bool reduced =
+      own && column.meaning == "thrust_N" && choice.baseline.empty() && source.table.schema.speed_column;
+  result.coefficient = result.coefficient || reduced;
+  for (Index r = 0; r < source.count(); ++r) {
+    const Observation& row = source.row(r);
+    result.value(r, 0) = own ? row.response : source.cell(r, choice.response);
+    if (std::isnan(result.value(r, 0)))
+      throw InputError::at(source.table.sheet.file, row.line, "the response {} is empty", result.response);
+    if (!reduced || !row.speed_rpm || !row.diameter_m) continue;
+    const double density = dry_air_density_kg_m3(row.air_pressure_Pa, row.air_temperature_C + kZeroCelsius_K);
+    result.known(r, 0) =
+        density * std::pow(*row.speed_rpm / 60, 2) * std::pow(*row.diameter_m, 4);  // T = C_T ρ n² D⁴
+  }
+}
+
+/// Groups that pulled the other way are measured by magnitude; a response of both signs is kept as it is.
+void set_scale(Observations& result, std::vector<std::size_t>& odd) {
+  std::map<int, double> sign;
+  for (Index r = 0; r < result.value.rows(); ++r)
+    sign[result.group[static_cast<std::size_t>(r)]] += result.value(r, 0) > 0 ? 1 : -1;
+  for (Index r = 0; r < result.value.rows(); ++r)
+    if (result.value(r, 0) * sign[result.group[static_cast<std::size_t>(r)]] <= 0)
+      odd.push_back(static_cast<std::size_t>(r));
+  result.multiplicative = odd.empty();
+  if (result.multiplicative) {
+    result.value = result.value.cwiseAbs();
+    result.y = (result.value.array() / result.known.array()).log();
+  } else {
+    result.y = result.value;
+    result.known.setOnes();
+  }
+}
+
+int index_in(std::map<std::string, int>& known, std::vector<std::string>& names, const std::string& name) {
+  const auto [found, fresh] = known.emplace(name, static_cast<int>(names.size()));
+  if (fresh) names.push_back(name);
+  return found->second;
+}
+
+/// "bins(COLUMN, N)": N parts of equal size by the column's value.
+std::vector<int> bins(const Source& source, const std::string& column, int count) {
+  std::vector<std::size_t> order(source.rows.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return source.cell(static_cast<Index>(a), column) < source.cell(static_cast<Index>(b), column);
+  });
+  std::vector<int> bin(order.size());
+  for (std::size_t k = 0; k < order.size(); ++k)
+    bin[order[k]] = static_cast<int>(k * static_cast<std::size_t>(count) / order.size());
+  return bin;
+}
+
+void set_blocks(const Source& source, Observations& result) {
+  const std::string& blocks = source.table.schema.blocks;
+  std::map<std::string, int> known;
+  if (blocks.starts_with("bins(")) {
+    const auto comma = blocks.rfind(',');
+    std::string column = blocks.substr(5, comma - 5);
+    while (!column.empty() && column.back() == ' ') column.pop_back();
+    const int count = std::stoi(blocks.substr(comma + 1));
+    result.block = bins(source, column, count);
+    for (int b = 0; b < count; ++b) result.block_name.push_back(fmt::format("{} {}", column, b + 1));
+    return;
+  }
+  result.blocks_are_rows = blocks == "rows";
+  for (Index r = 0; r < source.count(); ++r) {
+    const std::size_t sheet_row = source.rows[static_cast<std::size_t>(r)];
+    const std::string name =
+        result.blocks_are_rows ? std::to_string(r) : source.table.sheet.text(sheet_row, blocks);
+    result.block.push_back(index_in(known, result.block_name, name));
+  }
+}
+
+void set_belonging(const Source& source, Observations& result) {
+  std::map<std::string, int> known;
+  for (Index r = 0; r < source.count(); ++r) {
+    result.group.push_back(index_in(known, result.group_name, source.row(r).group));
+    result.name.push_back(fmt::format("{}:{}", source.table.sheet.file, source.row(r).line));
+  }
+  set_blocks(source, result);
+  result.in_tunnel.assign(result.group.size(), false);
+  result.previous.assign(result.group.size(), -1);
+}
+
+/// Place of a row's value within its group, 0 to 1.
+VectorXd ranks(const Source& source, const Observations& result, const std::string& column) {
+  std::map<int, std::vector<Index>> groups;
+  for (Index r = 0; r < source.count(); ++r) groups[result.group[static_cast<std::size_t>(r)]].push_back(r);
+  VectorXd rank(source.count());
+  for (auto& [group, rows] : groups) {
+    std::stable_sort(rows.begin(), rows.end(),
+                     [&](Index a, Index b) { return source.cell(a, column) < source.cell(b, column); });
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      rank(rows[k]) = (static_cast<double>(k) + 0.5) / static_cast<double>(rows.size());
+  }
+  return rank;
+}
+
+void set_hold_out(const Source& source, Observations& result) {
+  const std::string& text = source.table.schema.hold_out;
+  if (text.empty()) return;
+  const Expression expression(text, "table.toml: hold_out");
+  std::vector<VectorXd> columns;
+  for (const std::string& name : expression.names()) {
+    const bool rank = name.starts_with("rank(");
+    const std::string column = rank ? name.substr(5, name.size() - 6) : name;
+    source.table.sheet.require(column);
+    VectorXd values(source.count());
+    for (Index r = 0; r < source.count(); ++r) values(r) = source.cell(r, column);
+    columns.push_back(rank ? ranks(source, result, column) : values);
+  }
+  std::vector<double> values(columns.size());
+  for (Index r = 0; r < source.count(); ++r) {
+    for (std::size_t k = 0; k < columns.size(); ++k) values[k] = columns[k](r);
+    result.held_out.push_back(expression(values) != 0);
+  }
+  if (std::none_of(result.held_out.begin(), result.held_out.end(), [](bool held) { return held; }) ||
+      std::all_of(result.held_out.begin(), result.held_out.end(), [](bool held) { return held; }))
+    throw InputError::in("table.toml", "hold_out = \"{}\" takes all rows or none", text);
+}
+
+/// Columns of the same quantity as the baseline's, for crosstalk.
+void set_other_axes(const TableSchema& schema, const std::string& baseline, Observations& result) {
+  std::string_view quantity;
+  for (const TableColumn& column : schema.covariates)
+    if (column.column == baseline) quantity = unit_from_name(column.unit).quantity;
+  for (const TableColumn& column : schema.covariates)
+    if (column.column != baseline && !quantity.empty() && unit_from_name(column.unit).quantity == quantity)
+      result.other_axes.push_back(column.meaning.empty() ? column.column : column.meaning);
+}
+
+/// Whether each group that the fit can see lies within one block.
+void set_groups_within_blocks(Observations& result) {
+  std::map<int, std::set<int>> blocks_of_group;
+  for (std::size_t r = 0; r < result.group.size(); ++r)
+    if (result.held_out.empty() || !result.held_out[r])
+      blocks_of_group[result.group[r]].insert(result.block[r]);
+  result.groups_within_blocks = result.groups() > 1 && !result.blocks_are_rows &&
+                                std::all_of(blocks_of_group.begin(), blocks_of_group.end(),
+                                            [](const auto& g) { return g.second.size() == 1; });
+}
+
+/// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
+void set_baseline(const Source& source, const ObservationChoice& choice, Observations& result) {
+  result.baseline = choice.baseline.empty() ? "constant" : choice.baseline;
+  result.slopes.resize(source.count(), 0);
+  if (result.baseline == "constant") return;
+  const auto colon = result.baseline.find(':');
+  const std::string kind = result.baseline.substr(0, colon);
+  if ((kind != "linear" && kind != "power") || colon == std::string::npos)
+    throw InputError(
+        fmt::format("--baseline {}: a table has constant, linear:COLUMN and power:COLUMN", choice.baseline));
+  const std::string column = result.baseline.substr(colon + 1);
+  source.table.sheet.require(column);
+  if (kind == "linear" && result.multiplicative) {  // a straight line is no power law: additive
+    result.multiplicative = false;
+    result.y = result.value;
+    result.known.setOnes();
+  }
+  if (kind == "power" && !result.multiplicative)
+    throw InputError(fmt::format("--baseline {}: the response has both signs", choice.baseline));
+  result.slopes.resize(source.count(), 1);
+  for (Index r = 0; r < source.count(); ++r) {
+    const double x = source.cell(r, column);
+    if (std::isnan(x) || (kind == "power" && x <= 0))
+      throw InputError::at(source.table.sheet.file, source.row(r).line, "--baseline {}: column {} is {}",
+                           result.baseline, column, std::isnan(x) ? "empty" : "not above 0");
+    result.slopes(r, 0) = kind == "power" ? std::log(x) : x;
+  }
+  if (kind == "linear") set_other_axes(source.table.schema, column, result);
+  std::erase_if(result.covariates, [&](const Covariate& covariate) { return covariate.name == column; });
+}
+
+}  // namespace
+
+Observations observe_table(const ObservationTable& table, const ObservationChoice& choice) {
+  Observations result;
+  result.campaign = table.schema.name;
+  const Source source = moving_rows(table, result);
+  set_belonging(source, result);
+  set_response(source, choice, result);
+  if (!(result.value.maxCoeff() > result.value.minCoeff()))
+    throw InputError(fmt::format("the response {} is the same in every row: there is nothing to explain",
+                                 result.response));
+  std::vector<std::size_t> odd;
+  set_scale(result, odd);
+  add_covariates(source, result);
+  set_baseline(source, choice, result);
+  set_hold_out(source, result);
+  set_groups_within_blocks(result);
+  result.duration_s = VectorXd::Zero(source.count());
+  result.newtons_per_volt = VectorXd::Ones(1);
+  result.rig.rotors = 1;
+  if (const Covariate* diameter = result.find("propeller_diameter_m"))
+    result.rig.propeller_radius_m = diameter->value.col(0).mean() / 2;
+  if (const Covariate* speed = result.find("speed_rpm"))
+    result.rig.nominal_speed_rpm = speed->value.col(0).mean();
+  return result;
+}
+
+}  // namespace tunnelrig

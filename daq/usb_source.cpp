@@ -1,0 +1,200 @@
+#include "daq/usb_source.h"
+
+#include "daq/sources.h"
+#include "daq/usb_board.h"
+#include "datasets/csv.h"
+#include "datasets/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace tunnelrig {
+namespace {
+
+constexpr std::chrono::milliseconds kQuiet{20};
+constexpr int kOpenTries = 3;
+
+class UsbSource : public PacketSource {
+ public:
+  UsbSource(std::string name, const UsbSourceSettings& settings)
+      : name_(std::move(name)), settings_(settings), bus_(std::make_shared<UsbBus>()) {
+    std::string why;
+    for (int attempt = 0; attempt < kOpenTries && !open(why); ++attempt) {
+    }
+    if (!stream_) throw InputError::in(name_, "{}", why);
+  }
+
+  ~UsbSource() override {
+    if (board_ && !broken_) board_->stop();
+    stream_.reset();
+  }
+  UsbSource(const UsbSource&) = delete;
+  UsbSource& operator=(const UsbSource&) = delete;
+
+  std::string name() const override { return name_; }
+
+  /// What the board sampled while nobody recorded is no part of the run.
+  void begin_run() override {
+    rest_.clear();
+    if (!stream_ || !board_->stop()) return;
+    stream_->discard(kQuiet);
+    board_->start(settings_.pattern);
+  }
+
+  ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds timeout) override {
+    if (!rest_.empty()) return read_rest(buffer);
+    if (!stream_) return {ReadResult::Status::kBroken, 0, steady_seconds()};
+    const UsbStream::Got got = stream_->read(buffer, timeout);
+    if (got.status == UsbStream::Status::kData) {
+      silent_ = std::chrono::milliseconds(0);
+      return {ReadResult::Status::kData, got.size, got.time_s, got.cause};
+    }
+    if (got.status == UsbStream::Status::kBroken) return broken(got.cause);
+    // Waits are counted, not the clock: a program that was held up finds its bytes waiting.
+    silent_ += timeout;
+    if (silent_ >= silence_limit_) return broken("silent");
+    return {ReadResult::Status::kNothing, 0, got.time_s};
+  }
+
+  /// Only a broken stream is reopened: whether it is silent, the source's own watchdog knows, and to close
+  /// one that has just come back would cut off what it is sending.
+  bool reopen() override {
+    if (stream_ && !broken_) return true;
+    std::string why;
+    return open(why);
+  }
+
+ private:
+  ReadResult read_rest(std::span<std::byte> buffer) {
+    const std::size_t size = std::min(buffer.size(), rest_.size());
+    std::copy_n(rest_.begin(), size, buffer.begin());
+    rest_.erase(rest_.begin(), rest_.begin() + static_cast<std::ptrdiff_t>(size));
+    return {ReadResult::Status::kData, size, steady_seconds()};
+  }
+
+  ReadResult broken(const char* cause) {
+    broken_ = true;
+    return {ReadResult::Status::kBroken, 0, steady_seconds(), cause};
+  }
+
+  /// What has come is kept for the next read: a source that is reopened because nothing came may just have
+  /// got something.
+  void close() {
+    if (stream_) {
+      const std::vector<std::byte> rest = stream_->finish();
+      rest_.insert(rest_.end(), rest.begin(), rest.end());
+    }
+    stream_.reset();
+    board_.reset();
+  }
+
+  /// A board that is sampling already, since only its cable or its host had gone, goes on without a break.
+  bool open(std::string& why) {
+    close();
+    board_ = UsbBoard::open(bus_, settings_.serial, why);
+    if (!board_) return false;
+    const bool known =
+        board_->identity().boot_id == boot_id_ && (board_->identity().flags & TRW_FLAG_RUNNING) != 0;
+    if (!known && !configure(why)) {
+      close();
+      return false;
+    }
+    const auto rate = board_->rate();
+    stream_ = std::make_unique<UsbStream>(board_->handle(), settings_.stream);
+    if (!rate || rate->tick_hz == 0 || (!known && !board_->start(settings_.pattern))) {
+      why = "the board does not start";
+      close();
+      return false;
+    }
+    // A slow board is not a silent one: three of its packets.
+    const double frame_s = static_cast<double>(rate->ticks_per_frame) / rate->tick_hz;
+    silence_limit_ =
+        std::max(settings_.silence, std::chrono::milliseconds(std::llround(3e3 * std::max(frame_s, 0.012))));
+    boot_id_ = board_->identity().boot_id;
+    silent_ = std::chrono::milliseconds(0);
+    broken_ = false;
+    return true;
+  }
+
+  bool configure(std::string& why) {
+    if (settings_.rate_numerator_hz == 0 && settings_.oversampling == 0) return true;
+    const auto now = board_->rate();
+    if (!now || !board_->stop()) {
+      why = "the board does not answer";
+      return false;
+    }
+    trw_rate_wish wish{now->tick_hz, now->ticks_per_frame, now->oversampling};
+    if (settings_.rate_numerator_hz != 0) {
+      wish.numerator_hz = settings_.rate_numerator_hz;
+      wish.denominator = settings_.rate_denominator;
+    }
+    if (settings_.oversampling != 0) wish.oversampling = settings_.oversampling;
+    if (board_->set_rate(wish)) return true;
+    why = fmt::format(
+        "the board refuses {}/{} Hz with {} conversions per frame; its clock of {} Hz must make the rate "
+        "exactly",
+        wish.numerator_hz, wish.denominator, wish.oversampling, now->tick_hz);
+    return false;
+  }
+
+  std::string name_;
+  UsbSourceSettings settings_;
+  std::shared_ptr<UsbBus> bus_;
+  std::unique_ptr<UsbBoard> board_;
+  std::unique_ptr<UsbStream> stream_;
+  std::vector<std::byte> rest_;  // of streams that were closed
+  std::uint32_t boot_id_ = 0;
+  std::chrono::milliseconds silent_{0}, silence_limit_{0};
+  bool broken_ = false;
+};
+
+std::optional<std::uint32_t> whole(std::string_view text) {
+  const auto value = parse_number(text);
+  if (!value || *value < 1 || *value > 1e9 || *value != std::floor(*value)) return {};
+  return static_cast<std::uint32_t>(*value);
+}
+
+void parse_option(const std::string& name, std::string_view option, UsbSourceSettings& settings) {
+  const auto equals = option.find('=');
+  const std::string_view key = option.substr(0, equals);
+  const std::string_view value =
+      equals == std::string_view::npos ? std::string_view() : option.substr(equals + 1);
+  if (option == "test-pattern") {
+    settings.pattern = true;
+  } else if (key == "oversampling" && (value == "1" || value == "8")) {
+    settings.oversampling = value == "8" ? 8 : 1;
+  } else if (const auto slash = value.find('/'); key == "rate" && whole(value.substr(0, slash))) {
+    settings.rate_numerator_hz = *whole(value.substr(0, slash));
+    const auto denominator =
+        slash == std::string_view::npos ? std::optional(1u) : whole(value.substr(slash + 1));
+    if (!denominator) throw InputError::in(name, "'{}': write rate=4000/3 or rate=1000", option);
+    settings.rate_denominator = *denominator;
+  } else {
+    throw InputError::in(name, "'{}': write usb[:SERIAL][,test-pattern][,rate=4000/3][,oversampling=1 or 8]",
+                         option);
+  }
+}
+
+}  // namespace
+
+UsbSourceSettings parse_usb_source(const std::string& name, std::string_view text) {
+  UsbSourceSettings settings;
+  const auto comma = text.find(',');
+  settings.serial = text.substr(0, comma);
+  while (!text.empty() && text.find(',') != std::string_view::npos) {
+    text.remove_prefix(text.find(',') + 1);
+    parse_option(name, text.substr(0, text.find(',')), settings);
+  }
+  return settings;
+}
+
+std::unique_ptr<PacketSource> open_usb_source(const std::string& name, const UsbSourceSettings& settings) {
+  return std::make_unique<UsbSource>(name, settings);
+}
+
+std::unique_ptr<PacketSource> open_usb(const std::string& name, std::string_view board) {
+  return open_usb_source(name, parse_usb_source(name, board));
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,262 @@
+// The protocol from end to end on simulated observations, and what is written of it.
+#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/simulated.h"
+#include "support/seeds.h"
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig {
+namespace {
+
+using nlohmann::json;
+using testing::Contains;
+using testing::HasSubstr;
+
+SearchSettings quick() {
+  SearchSettings settings;
+  settings.simulations = 199;
+  return settings;
+}
+
+struct ExplainTest : testing::Test {
+  std::mt19937_64 random{test::seed()};
+
+  Observations observations(int blocks, double sigma = 0.002) {
+    Observations o = test::simulate({.runs_of_block = std::vector<int>(static_cast<std::size_t>(blocks), 8),
+                                     .channels = 4,
+                                     .sigma = sigma,
+                                     .session_ratio = 0.4},
+                                    random);
+    test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
+    test::add_covariate(o, "air_pressure_Pa", 100500, 102500, random);
+    test::add_covariate(o, "tunnel_airspeed_m_s", 0, 0.4, random);
+    return o;
+  }
+  static Explanation explained(const Observations& o) { return explain(o, test::every_effect(), quick()); }
+};
+
+void expect_finite(const json& value, const std::string& path) {
+  if (value.is_number()) {
+    EXPECT_TRUE(std::isfinite(value.get<double>())) << path;
+  }
+  if (value.is_object() || value.is_array())
+    for (const auto& [key, inner] : value.items()) expect_finite(inner, path + "/" + key);
+}
+
+/// Field names are a contract.
+void expect_contract(const Explanation& explanation) {
+  const json written = json::parse(explanation_json(explanation));
+  for (const char* key : {"format", "campaign", "response", "unit", "baseline", "verdict", "noise_floor",
+                          "blocks", "runs", "before", "after", "adopted", "unknown", "untestable",
+                          "suspect_rows", "detectable_at_80_percent_power"})
+    EXPECT_TRUE(written.contains(key)) << key;
+  EXPECT_EQ(written["format"], "tunnelrig-explain/1");
+  for (const char* when : {"before", "after"}) {
+    EXPECT_TRUE(written[when]["rmse"].is_number());
+    EXPECT_TRUE(written[when]["held_out_rmse"].is_number());
+    ASSERT_EQ(written[when]["held_out_ci95"].size(), 2u);
+    EXPECT_LE(written[when]["held_out_ci95"][0], written[when]["held_out_ci95"][1]);
+  }
+  for (const json& adopted : written["adopted"]) {
+    for (const char* key :
+         {"effect", "rotor", "parameters", "p_value", "held_out_gain", "confounded_with", "separating_run"})
+      EXPECT_TRUE(adopted.contains(key)) << key;
+    for (const json& parameter : adopted["parameters"]) {
+      EXPECT_TRUE(parameter["value"].is_number());
+      EXPECT_EQ(parameter["ci95"].size(), 2u);
+      EXPECT_TRUE(parameter["unit"].is_string());
+    }
+  }
+  for (const json& unknown : written["unknown"]) {
+    for (const char* key : {"covariate", "rotor", "p_value", "amplitude", "shape"})
+      EXPECT_TRUE(unknown.contains(key)) << key;
+    for (const json& point : unknown["shape"]) EXPECT_EQ(point.size(), 4u);
+  }
+  for (const json& untestable : written["untestable"]) {
+    EXPECT_TRUE(untestable.contains("effect"));
+    EXPECT_TRUE(!untestable["missing"].empty() || !untestable["reason"].get<std::string>().empty())
+        << untestable;
+  }
+  for (const json& row : written["suspect_rows"]) {
+    EXPECT_TRUE(row.contains("row"));
+    EXPECT_TRUE(row.contains("studentised"));
+  }
+  EXPECT_GT(written["noise_floor"], 0);
+  expect_finite(written, "");
+}
+
+TEST_F(ExplainTest, NothingIsFoundWhereThereIsNothing) {
+  const Observations o = observations(16);
+  const Explanation e = explained(o);
+  EXPECT_EQ(e.verdict, "no_structure");
+  EXPECT_TRUE(e.adopted.empty());
+  EXPECT_TRUE(e.unknown.empty());
+  EXPECT_EQ(e.after.rmse, e.before.rmse);
+  EXPECT_EQ(e.after.held_out_rmse, e.before.held_out_rmse);
+  EXPECT_EQ(e.after.held_out_low, e.before.held_out_low);
+  EXPECT_EQ(e.after.held_out_high, e.before.held_out_high);
+  EXPECT_GT(e.detectable, 0);
+  EXPECT_LT(e.detectable, 3 * 0.002 * 7);
+  EXPECT_EQ(e.blocks, 16);
+  EXPECT_EQ(e.runs, 128);
+  expect_contract(e);
+  EXPECT_THAT(explanation_text(e), HasSubstr("no effect above"));
+}
+
+TEST_F(ExplainTest, OneStrongEffectIsNamedAndExplained) {
+  Observations o = observations(16);
+  test::add_effect(o, "supply_voltage", {0.5});
+  const Explanation e = explained(o);
+  EXPECT_EQ(e.verdict, "explained");
+  ASSERT_EQ(e.adopted.size(), 1u);
+  EXPECT_EQ(e.adopted[0].term.effect->name, "supply_voltage");
+  EXPECT_LE(e.adopted[0].p_value, 0.02);
+  EXPECT_GT(e.adopted[0].held_out_gain, 0);
+  const ParameterEstimate& exponent = e.adopted[0].parameters.at(0);
+  EXPECT_LT(exponent.low, 0.5);
+  EXPECT_GT(exponent.high, 0.5);
+  EXPECT_LT(e.after.held_out_rmse, 0.5 * e.before.held_out_rmse);
+  EXPECT_NEAR(e.after.held_out_rmse / e.noise_floor, 1, 0.25);
+  expect_contract(e);
+}
+
+TEST_F(ExplainTest, TheSameSeedSaysTheSame) {
+  Observations o = observations(10);
+  test::add_effect(o, "supply_voltage", {0.1});
+  EXPECT_EQ(explanation_json(explained(o)), explanation_json(explained(o)));
+}
+
+TEST_F(ExplainTest, FiveBlocksOrFewerAreInsufficientAlways) {
+  for (const int blocks : {1, 2, 3, 4, 5}) {
+    Observations o = observations(blocks);
+    test::add_effect(o, "supply_voltage", {2});
+    const Explanation e = explained(o);
+    EXPECT_EQ(e.verdict, "insufficient") << blocks;
+    EXPECT_TRUE(e.adopted.empty());
+    EXPECT_EQ(e.after.held_out_rmse, e.before.held_out_rmse);
+    EXPECT_GT(e.before.rmse, 0);
+    expect_contract(e);
+  }
+  EXPECT_NE(explained(observations(6)).verdict, "insufficient");
+}
+
+TEST_F(ExplainTest, StructureWithoutANameIsUnknown) {
+  Observations o = observations(16);
+  test::add_covariate(o, "cable_slack_mm", 0, 30, random);
+  const Eigen::MatrixXd wave = (0.35 * o.find("cable_slack_mm")->value.array()).sin();
+  test::set_y(o, o.y + 0.006 * wave.replicate(1, 4));
+  const Explanation e = explained(o);
+  EXPECT_EQ(e.verdict, "unknown");
+  ASSERT_EQ(e.unknown.size(), 1u);
+  EXPECT_EQ(e.unknown[0].covariate, "cable_slack_mm");
+  EXPECT_EQ(e.unknown[0].rotor, -1);
+  EXPECT_NEAR(e.unknown[0].amplitude, 0.006 * 7, 0.3 * 0.006 * 7) << "half of peak to peak, newtons";
+  EXPECT_GE(e.unknown[0].shape.size(), 10u);
+  EXPECT_EQ(e.after.held_out_rmse, e.before.held_out_rmse) << "a curve without a name is not adopted";
+  expect_contract(e);
+  EXPECT_THAT(explanation_text(e), HasSubstr("depends on cable_slack_mm"));
+
+  test::add_effect(o, "supply_voltage", {0.6});
+  const Explanation both = explained(o);
+  EXPECT_EQ(both.verdict, "partly_explained") << "unknown structure goes before everything that is named";
+  ASSERT_EQ(both.adopted.size(), 1u);
+  EXPECT_EQ(both.adopted[0].term.effect->name, "supply_voltage");
+  expect_contract(both);
+}
+
+TEST_F(ExplainTest, AnEffectOfOneRotorIsThatRotors) {
+  Observations o = observations(16);
+  test::add_covariate(o, "cable_force_N", -1, 1, random);
+  const Covariate cable = *o.find("cable_force_N");
+  Eigen::MatrixXd y = o.y;
+  y.col(1) += 0.01 * cable.value;
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.adopted.size(), 1u);
+  EXPECT_EQ(e.adopted[0].term.effect->name, "cable_force");
+  EXPECT_EQ(e.adopted[0].term.rotor, 1);
+  EXPECT_EQ(json::parse(explanation_json(e))["adopted"][0]["rotor"], 2) << "rotors count from 1";
+}
+
+TEST_F(ExplainTest, EffectsThatGoTogetherAreConfounded) {
+  Observations o = observations(16);
+  Covariate excitation = *o.find("supply_voltage_V");  // one supply feeds both
+  excitation.name = "excitation_voltage_V";
+  excitation.value *= 5.0 / 16;
+  o.covariates.push_back(excitation);
+  test::add_effect(o, "supply_voltage", {0.5});
+  const Explanation e = explained(o);
+  EXPECT_EQ(e.verdict, "confounded");
+  ASSERT_EQ(e.adopted.size(), 1u);
+  std::vector<std::string> set = e.adopted[0].confounded_with;
+  set.push_back(e.adopted[0].term.effect->name);
+  EXPECT_THAT(set, testing::UnorderedElementsAre("supply_voltage", "excitation_voltage"));
+  ASSERT_TRUE(e.adopted[0].separating_run.has_value());
+  EXPECT_GT(e.adopted[0].separating_run->expected_sigma, 1);
+  EXPECT_THAT(e.warnings, Contains(HasSubstr("go together")));
+  for (const char* name : {"supply_voltage", "excitation_voltage"})
+    EXPECT_TRUE(std::any_of(e.untestable.begin(), e.untestable.end(), [&](const Untestable& u) {
+      return u.effect == name && u.reason.find("collinear") != std::string::npos;
+    })) << name;
+  expect_contract(e);
+}
+
+TEST_F(ExplainTest, AGrossRowIsSuspectAndNamesNothing) {
+  Observations o = observations(16);
+  Eigen::MatrixXd y = o.y;
+  y(77, 2) += 0.05;
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.suspect_rows.size(), 1u);
+  EXPECT_EQ(e.suspect_rows[0].row, o.name[77]);
+  EXPECT_GT(e.suspect_rows[0].studentised, 5) << "measured above predicted";
+  EXPECT_TRUE(e.adopted.empty());
+}
+
+TEST_F(ExplainTest, WhatCannotVaryIsUntestableWithAReason) {
+  Observations o = observations(8);
+  Covariate constant{"excitation_voltage_V", Eigen::MatrixXd::Constant(o.rows(), 1, 5.0)};
+  o.covariates.push_back(constant);
+  const Explanation e = explained(o);
+  const auto entry = std::find_if(e.untestable.begin(), e.untestable.end(),
+                                  [](const Untestable& u) { return u.effect == "excitation_voltage"; });
+  ASSERT_NE(entry, e.untestable.end());
+  EXPECT_THAT(entry->reason, HasSubstr("does not vary"));
+  const auto missing = std::find_if(e.untestable.begin(), e.untestable.end(),
+                                    [](const Untestable& u) { return u.effect == "ground_effect"; });
+  ASSERT_NE(missing, e.untestable.end());
+  EXPECT_THAT(missing->missing, testing::ElementsAre("ground_distance_R"));
+}
+
+TEST_F(ExplainTest, CandidatesAreListedWithAndWithoutData) {
+  const json all = json::parse(candidates_json(test::every_effect(), nullptr));
+  EXPECT_EQ(all.size(), all_effects().size());
+  for (const json& one : all)
+    for (const char* key : {"effect", "form", "formula", "physics", "parameters", "covariates", "sign"})
+      EXPECT_TRUE(one.contains(key)) << key;
+  const Observations o = observations(8);
+  for (const json& one : json::parse(candidates_json(test::every_effect(), &o))) {
+    if (one["effect"] == "supply_voltage") {
+      EXPECT_TRUE(one["testable"]);
+    }
+    if (one["effect"] == "cable_force") {
+      EXPECT_FALSE(one["testable"]);
+      EXPECT_EQ(one["missing"], json::array({"cable_force_N"}));
+    }
+  }
+  EXPECT_THAT(candidates_text(test::every_effect(), &o), HasSubstr("not recorded: cable_force_N"));
+}
+
+TEST_F(ExplainTest, RoundsKeepWhatTheySaw) {
+  Observations o = observations(10);
+  test::add_effect(o, "supply_voltage", {0.5});
+  const Explanation e = explained(o);
+  EXPECT_FALSE(e.rounds.empty());
+  EXPECT_FALSE(e.rounds[0].null_maxima.empty());
+  EXPECT_FALSE(e.rounds[0].ranking.empty());
+  EXPECT_EQ(e.rounds[0].ranking[0].term.effect->name, "supply_voltage");
+}
+
+}  // namespace
+}  // namespace tunnelrig

@@ -1,0 +1,215 @@
+// Prediction of runs that the fit did not see.
+#include "analysis/residual/held_out.h"
+
+#include "analysis/residual/simulated.h"
+#include "support/seeds.h"
+
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Variances that are known: σ and one ratio for all strata.
+NullFit known_variances(const Observations& o, double sigma, std::size_t ratio) {
+  const std::size_t strata = MixedModel(o, test::all_rows(o)).strata().size();
+  return {.ratio = std::vector<std::size_t>(strata, ratio),
+          .sigma = std::vector<double>(strata, sigma),
+          .ratio_probability = {}};
+}
+
+struct Split {
+  std::vector<int> fit, test;
+};
+/// Every third block is held out; the blocks that first visit the groups stay.
+Split split_blocks(const Observations& o) {
+  Split split;
+  for (const int row : test::all_rows(o))
+    (o.block[static_cast<std::size_t>(row)] % 3 == 1 ? split.test : split.fit).push_back(row);
+  return split;
+}
+
+MatrixXd normal(Index rows, Index columns, std::mt19937_64& random) {
+  std::normal_distribution<double> draw;
+  return MatrixXd::NullaryExpr(rows, columns, [&] { return draw(random); });
+}
+
+struct HeldOut : testing::TestWithParam<int> {};
+
+TEST_P(HeldOut, ErrorsAreThoseOfDirectLeastSquares) {
+  std::mt19937_64 random(test::seed());
+  const int c = GetParam();
+  const Observations o = test::simulate(
+      {.runs_of_block = {5, 3, 6, 2, 7, 4, 5}, .channels = c, .session_ratio = 0, .multiplicative = false},
+      random);
+  const Split split = split_blocks(o);
+  const std::vector<MatrixXd> columns = {normal(o.rows(), c, random), normal(o.rows(), c, random)};
+  const HeldOutErrors errors = predict_held_out(o, {o.y}, {{columns[0]}, {columns[1]}},
+                                                known_variances(o, 0.002, 0), split.fit, split.test);
+
+  // one regression for all rotors: a constant for each group and rotor, and the two columns
+  const auto design = [&](const std::vector<int>& rows) {
+    const MatrixXd x = test::dense_baseline(o, split.fit, rows);
+    MatrixXd all = MatrixXd::Zero(x.rows() * c, x.cols() * c + 2);
+    for (int channel = 0; channel < c; ++channel) {
+      all.block(channel * x.rows(), channel * x.cols(), x.rows(), x.cols()) = x;
+      for (Index k = 0; k < 2; ++k)
+        all.block(channel * x.rows(), x.cols() * c + k, x.rows(), 1) =
+            columns[static_cast<std::size_t>(k)](rows, channel);
+    }
+    return all;
+  };
+  const VectorXd y = o.y(split.fit, Eigen::all).reshaped();
+  const MatrixXd x = design(split.fit);
+  const VectorXd beta = x.colPivHouseholderQr().solve(y);
+  const MatrixXd predicted = (design(split.test) * beta).reshaped(static_cast<Index>(split.test.size()), c);
+  EXPECT_LT((errors.error - (predicted - o.value(split.test, Eigen::all))).norm(), 1e-9);
+  EXPECT_LT((errors.amplitude - beta.tail(2)).norm(), 1e-10);
+  EXPECT_EQ(errors.count(), static_cast<Index>(split.test.size()) * c);
+  EXPECT_NEAR(errors.loss(), errors.sum_of_squares() / 0.002 / 0.002, 1e-6 * errors.loss());
+
+  const MatrixXd information = (x.transpose() * x).inverse();
+  const MatrixXd x_test = design(split.test);
+  const VectorXd variance =
+      0.002 * 0.002 * (1 + ((x_test * information).array() * x_test.array()).rowwise().sum());
+  // over the rotors of a run: how its modes go together is left out of each rotor's share
+  const VectorXd expected = variance.reshaped(static_cast<Index>(split.test.size()), c).rowwise().sum();
+  EXPECT_LT((errors.expected_std.cwiseAbs2().rowwise().sum() - expected).norm(), 1e-12);
+}
+
+TEST_P(HeldOut, MultiplicativeErrorsAreInTheResponsesUnit) {
+  std::mt19937_64 random(test::seed() + 1);
+  const Observations o = test::simulate({.channels = GetParam(), .session_ratio = 0}, random);
+  const Split split = split_blocks(o);
+  const HeldOutErrors errors =
+      predict_held_out(o, {o.y}, {}, known_variances(o, 0.002, 0), split.fit, split.test);
+  const MatrixXd x = test::dense_baseline(o, split.fit, split.fit),
+                 x_test = test::dense_baseline(o, split.fit, split.test);
+  const MatrixXd y = o.y(split.fit, Eigen::all);
+  const MatrixXd predicted = 7.0 * (x_test * x.colPivHouseholderQr().solve(y)).array().exp();
+  EXPECT_LT((errors.error - (predicted - o.value(split.test, Eigen::all))).norm(), 1e-9);
+}
+
+TEST_P(HeldOut, ExpectedScatterCoversTheErrors) {
+  std::mt19937_64 random(test::seed() + 2);
+  const std::size_t ratio = 4;  // σ_session = σ_run
+  double squares = 0, inside = 0, count = 0;
+  std::vector<double> of_campaign;
+  for (int i = 0; i < 300; ++i) {
+    const Observations o = test::simulate({.runs_of_block = std::vector<int>(9, 4),
+                                           .groups = 3,
+                                           .channels = GetParam(),
+                                           .session_ratio = kRatios[ratio]},
+                                          random);
+    const Split split = split_blocks(o);
+    const MatrixXd column = normal(o.rows(), 1, random).replicate(1, GetParam());
+    const HeldOutErrors errors =
+        predict_held_out(o, {o.y}, {{column}}, known_variances(o, 0.002, ratio), split.fit, split.test);
+    const auto z = (errors.error.array() / errors.expected_std.array()).eval();
+    squares += z.square().sum();
+    of_campaign.push_back(z.square().mean());
+    inside += static_cast<double>((z.abs() < 1.96).count());
+    count += static_cast<double>(z.size());
+  }
+  double spread = 0;  // errors of one campaign go together: its mean counts as one
+  for (const double value : of_campaign) spread += std::pow(value - squares / count, 2);
+  const double standard_error = std::sqrt(spread) / static_cast<double>(of_campaign.size());
+  EXPECT_NEAR(squares / count, 1, 4 * standard_error);
+  EXPECT_NEAR(inside / count, 0.95, 0.015);
+}
+
+TEST_P(HeldOut, GroupsThatOnlyTheHeldOutPartHasAreNotScored) {
+  std::mt19937_64 random(test::seed() + 3);
+  Observations o = test::simulate({.channels = GetParam()}, random);
+  Split split = split_blocks(o);
+  std::erase_if(split.fit, [&](int row) { return o.group[static_cast<std::size_t>(row)] == 1; });
+  const HeldOutErrors errors =
+      predict_held_out(o, {o.y}, {}, known_variances(o, 0.002, 2), split.fit, split.test);
+  Index scored = 0;
+  for (std::size_t r = 0; r < split.test.size(); ++r) {
+    const bool unseen = o.group[static_cast<std::size_t>(split.test[r])] == 1;
+    for (Index c = 0; c < GetParam(); ++c) {
+      EXPECT_EQ(std::isnan(errors.error(static_cast<Index>(r), c)), unseen);
+      scored += unseen ? 0 : 1;
+    }
+  }
+  EXPECT_EQ(errors.count(), scored);
+  EXPECT_LT(scored, errors.error.size());
+  EXPECT_TRUE(std::isfinite(errors.sum_of_squares()));
+  EXPECT_TRUE(std::isfinite(errors.loss()));
+
+  std::vector<int> seen = split.test;
+  std::erase_if(seen, [&](int row) { return o.group[static_cast<std::size_t>(row)] == 1; });
+  const HeldOutErrors same = predict_held_out(o, {o.y}, {}, known_variances(o, 0.002, 2), split.fit, seen);
+  EXPECT_NEAR(same.loss(), errors.loss(), 1e-9 * same.loss());
+}
+
+TEST_P(HeldOut, WhereTheGroupIsTheBlockItsConstantComesFromEveryOtherRun) {
+  std::mt19937_64 random(test::seed() + 4);
+  Observations o = test::simulate({.runs_of_block = std::vector<int>(6, 5),
+                                   .groups = 6,
+                                   .channels = GetParam(),
+                                   .session_ratio = 0,
+                                   .multiplicative = false},
+                                  random);
+  o.group = o.block;
+  o.groups_within_blocks = true;
+  const Split split = split_blocks(o);
+  const HeldOutErrors errors =
+      predict_held_out(o, {o.y}, {}, known_variances(o, 0.002, 0), split.fit, split.test);
+  for (std::size_t r = 0; r < split.test.size(); ++r) {
+    const auto place = r % 5;  // in its block: 0, 2 and 4 give the constant, 1 and 3 are scored
+    for (Index c = 0; c < GetParam(); ++c) {
+      const double error = errors.error(static_cast<Index>(r), c);
+      if (place % 2 == 0) {
+        EXPECT_TRUE(std::isnan(error));
+        continue;
+      }
+      const int first = split.test[r - place];
+      const double constant = (o.value(first, c) + o.value(first + 2, c) + o.value(first + 4, c)) / 3;
+      EXPECT_NEAR(error, constant - o.value(split.test[r], c), 1e-12);
+      EXPECT_NEAR(errors.expected_std(static_cast<Index>(r), c), 0.002 * std::sqrt(1 + 1 / 3.0), 1e-12);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Rotors, HeldOut, testing::Values(1, 4));
+
+TEST(CrossValidation, LeavesOutEachBlockOnce) {
+  std::mt19937_64 random(test::seed() + 5);
+  const Observations o = test::simulate({.runs_of_block = {4, 6, 5, 3, 7, 5, 4, 6}}, random);
+  const NullFit null = known_variances(o, 0.002, 3);
+  const CrossValidation validation = cross_validate(o, {o.y}, {}, null, test::all_rows(o));
+  ASSERT_EQ(validation.folds.size(), 8u);
+  double squares = 0;
+  for (int block = 0; block < 8; ++block) {
+    std::vector<int> fit, held;
+    for (const int row : test::all_rows(o))
+      (o.block[static_cast<std::size_t>(row)] == block ? held : fit).push_back(row);
+    const HeldOutErrors direct = predict_held_out(o, {o.y}, {}, null, fit, held);
+    EXPECT_EQ(validation.folds[static_cast<std::size_t>(block)].rows, held);
+    EXPECT_NEAR(validation.losses()(block), direct.loss(), 1e-9);
+    squares += direct.sum_of_squares();
+  }
+  EXPECT_NEAR(validation.rmse(), std::sqrt(squares / static_cast<double>(o.rows())), 1e-12);
+  const LossDifference none = compare(validation, validation);
+  EXPECT_EQ(none.mean, 0);
+  EXPECT_EQ(none.standard_error, 0);
+}
+
+TEST(CrossValidation, ManyBlocksAreDealtOut) {
+  std::mt19937_64 random(test::seed() + 6);
+  const Observations o = test::simulate({.runs_of_block = std::vector<int>(60, 2)}, random);
+  const CrossValidation validation =
+      cross_validate(o, {o.y}, {}, known_variances(o, 0.002, 1), test::all_rows(o));
+  EXPECT_EQ(validation.folds.size(), 24u);
+  std::size_t rows = 0;
+  for (const HeldOutErrors& fold : validation.folds) rows += fold.rows.size();
+  EXPECT_EQ(rows, 120u);
+}
+
+}  // namespace
+}  // namespace tunnelrig

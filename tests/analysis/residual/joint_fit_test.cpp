@@ -1,0 +1,124 @@
+// All parameters at once, on data whose truth is known.
+#include "analysis/residual/joint_fit.h"
+
+#include "analysis/residual/simulated.h"
+#include "support/seeds.h"
+
+#include <gmock/gmock.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::MatrixXd;
+
+struct JointFitTest : testing::Test {
+  std::mt19937_64 random{test::seed()};
+
+  Observations observations(int channels, int shapes, double sigma) {
+    Observations o = test::simulate(
+        {.runs_of_block = std::vector<int>(14, 8), .channels = channels, .shapes = shapes, .sigma = sigma},
+        random);
+    test::add_covariate(o, "air_pressure_Pa", 98000, 104000, random);
+    test::add_covariate(o, "time_since_motor_start_s", 5, 400, random);
+    return o;
+  }
+  static Term term(const std::string& name, std::vector<double> parameters) {
+    return {.effect = &test::effect_named(name), .parameters = std::move(parameters)};
+  }
+};
+
+TEST_F(JointFitTest, RecoversCreepAndPressure) {
+  for (const int channels : {1, 4}) {
+    Observations o = observations(channels, 0, 2e-4);
+    test::add_effect(o, "creep", {0.04, 90});
+    test::add_effect(o, "air_pressure", {1.2});
+    const auto rows = test::all_rows(o);
+    const JointFit fit = fit_jointly(o, {{term("creep", {0.02, 50}), term("air_pressure", {0.5})}, {}}, rows);
+    EXPECT_TRUE(fit.converged);
+    EXPECT_TRUE(fit.at_bound.empty());
+    // standard errors from the linearised model that the fit ends with
+    const AmplitudeFit errors = fit_amplitudes(o, difference(response_components(o), fit.linear.offset),
+                                               fit.linear.columns, fit.variances, rows);
+    ASSERT_EQ(errors.covariance.rows(), 3);
+    const std::vector<double> truth = {0.04, 90, 1.2};
+    const std::vector<double> found = {fit.model.terms[0].parameters[0], fit.model.terms[0].parameters[1],
+                                       fit.model.terms[1].parameters[0]};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      const double standard_error = std::sqrt(errors.covariance(i, i));
+      EXPECT_LT(standard_error, 0.15 * truth[k]);
+      EXPECT_NEAR(found[k], truth[k], 4 * standard_error);
+    }
+    EXPECT_NEAR(fit.variances.sigma[0], 2e-4, 5e-5);
+  }
+}
+
+TEST_F(JointFitTest, TheCourseWithinRunsSharpensTheTimeConstant) {
+  Observations o = observations(1, kShapes, 5e-4);
+  test::add_effect(o, "creep", {0.04, 40});
+  Observations means = o;
+  means.shape.clear();
+  const auto rows = test::all_rows(o);
+  const MeanModel start{{term("creep", {0.02, 80})}, {}};
+  const auto error_of = [&](const Observations& data) {
+    const JointFit fit = fit_jointly(data, start, rows);
+    const AmplitudeFit amplitudes =
+        fit_amplitudes(data, difference(response_components(data), fit.linear.offset), fit.linear.columns,
+                       fit.variances, rows);
+    const double standard_error = std::sqrt(amplitudes.covariance(1, 1));
+    EXPECT_NEAR(fit.model.terms[0].parameters[1], 40, 4 * standard_error);
+    return standard_error;
+  };
+  EXPECT_LT(error_of(o), error_of(means));
+}
+
+TEST_F(JointFitTest, KeepsBoundsAndSaysSo) {
+  Observations o = observations(1, 0, 2e-4);
+  test::add_effect(o, "air_pressure", {4});  // physics allows 3
+  const JointFit fit = fit_jointly(o, {{term("air_pressure", {1})}, {}}, test::all_rows(o));
+  EXPECT_EQ(fit.model.terms[0].parameters[0], 3);
+  EXPECT_THAT(fit.at_bound, testing::ElementsAre("air_pressure exponent"));
+}
+
+TEST_F(JointFitTest, TheorysCoefficientStays) {
+  Observations o = observations(1, 0, 2e-4);
+  test::add_effect(o, "air_pressure", {1.4});
+  MeanModel start{{term("air_pressure", {1})}, {}};
+  start.terms[0].at_theory = true;
+  const JointFit fit = fit_jointly(o, start, test::all_rows(o));
+  EXPECT_EQ(fit.model.terms[0].parameters[0], 1);
+  EXPECT_TRUE(fit.linear.columns.empty());
+}
+
+TEST_F(JointFitTest, ACurveTakesWhatTheTermsLeave) {
+  Observations o = observations(1, 0, 2e-4);
+  test::add_effect(o, "creep", {0.05, 60});
+  test::add_covariate(o, "humidity_of_paper", 0, 1, random);
+  const MatrixXd wave = (6 * o.find("humidity_of_paper")->value.array()).sin();
+  test::set_y(o, o.y + 0.01 * wave);
+  const auto rows = test::all_rows(o);
+  MeanModel start{{term("creep", {0.02, 100})}, {}};
+  const auto sigma = [&] { return fit_jointly(o, start, rows).variances.sigma[0]; };
+  const double without = sigma();
+  for (const Curve& curve : curves_to_try(o, rows))
+    if (curve.covariate == "humidity_of_paper" && curve.columns.size() == 6) start.curves = {curve};
+  ASSERT_EQ(start.curves.size(), 1u);
+  const JointFit fit = fit_jointly(o, start, rows);
+  EXPECT_GT(without, 10 * fit.variances.sigma[0]);
+  EXPECT_NEAR(fit.model.terms[0].parameters[0], 0.05, 0.003);
+}
+
+TEST_F(JointFitTest, RefitFollowsTheRuns) {
+  Observations o = observations(1, 0, 2e-4);
+  test::add_effect(o, "creep", {0.04, 90});
+  const auto rows = test::all_rows(o);
+  const JointFit whole = fit_jointly(o, {{term("creep", {0.04, 90})}, {}}, rows);
+  const MeanModel again = refit(o, whole.model, whole.variances, rows);
+  EXPECT_NEAR(again.terms[0].parameters[0], whole.model.terms[0].parameters[0], 1e-4);
+  const MeanModel half = refit(o, whole.model, whole.variances, {rows.begin(), rows.begin() + 56});
+  EXPECT_NE(half.terms[0].parameters[0], again.terms[0].parameters[0]);
+  EXPECT_NEAR(half.terms[0].parameters[0], 0.04, 0.01);
+}
+
+}  // namespace
+}  // namespace tunnelrig

@@ -1,0 +1,170 @@
+// Likelihood ratios against brute force on dense matrices.
+#include "analysis/residual/likelihood.h"
+
+#include "analysis/residual/simulated.h"
+#include "calibration/distributions.h"
+#include "support/seeds.h"
+
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Restricted log-likelihood of y at a ratio, the columns' amplitudes and σ at their best.
+struct DenseFit {
+  double log_likelihood = 0, sigma = 0;
+  VectorXd amplitude;
+};
+DenseFit dense_fit(const Observations& o, const VectorXd& y, const MatrixXd& columns, double ratio) {
+  const std::vector<int> rows = test::all_rows(o);
+  const MatrixXd v = test::dense_covariance(o, rows, ratio), x = test::dense_baseline(o, rows, rows);
+  MatrixXd all(x.rows(), x.cols() + columns.cols());
+  all << x, columns;
+  const MatrixXd vinv = v.inverse();
+  const VectorXd beta = (all.transpose() * vinv * all).ldlt().solve(all.transpose() * vinv * y);
+  const VectorXd residual = y - all * beta;
+  const double rss = residual.dot(vinv * residual), dof = static_cast<double>(y.size() - x.cols());
+  const double determinants = std::log(v.determinant()) + std::log((x.transpose() * vinv * x).determinant());
+  return {-0.5 * dof * std::log(rss / dof) - 0.5 * determinants, std::sqrt(rss / dof),
+          beta.tail(columns.cols())};
+}
+
+/// The best of the grid's ratios from `first` to `last`.
+DenseFit best_of(const Observations& o, const VectorXd& y, const MatrixXd& columns, std::size_t first,
+                 std::size_t last, std::size_t* at = nullptr) {
+  DenseFit best{.log_likelihood = -1e300, .amplitude = {}};
+  for (std::size_t r = first; r <= last; ++r) {
+    DenseFit fit = dense_fit(o, y, columns, kRatios[r]);
+    if (fit.log_likelihood <= best.log_likelihood) continue;
+    best = std::move(fit);
+    if (at != nullptr) *at = r;
+  }
+  return best;
+}
+
+MatrixXd normal(Index rows, Index columns, std::mt19937_64& random) {
+  std::normal_distribution<double> draw;
+  return MatrixXd::NullaryExpr(rows, columns, [&] { return draw(random); });
+}
+
+TEST(Likelihood, NullIsTheDenseMaximum) {
+  std::mt19937_64 random(test::seed());
+  for (int i = 0; i < 30; ++i) {
+    const Observations o =
+        test::simulate({.runs_of_block = {3, 6, 4, 8, 5, 2, 7}, .session_ratio = 0.3 * i}, random);
+    const MixedModel model(o, test::all_rows(o));
+    const NullFit null = CandidateScan(model, {}, {}).null_fit({o.y});
+    std::size_t ratio = 0;
+    const DenseFit dense = best_of(o, o.y.col(0), MatrixXd(o.rows(), 0), 0, kRatios.size() - 1, &ratio);
+    EXPECT_EQ(null.ratio[0], ratio);
+    EXPECT_NEAR(null.log_likelihood, dense.log_likelihood, 1e-8);
+    EXPECT_NEAR(null.sigma[0], dense.sigma, 1e-10);
+    double sum = 0;
+    for (std::size_t r = 0; r < kRatios.size(); ++r) {
+      sum += null.ratio_probability[0][r];
+      const double log_likelihood =
+          dense_fit(o, o.y.col(0), MatrixXd(o.rows(), 0), kRatios[r]).log_likelihood;
+      EXPECT_NEAR(std::log(null.ratio_probability[0][r] / null.ratio_probability[0][ratio]),
+                  log_likelihood - dense.log_likelihood, 1e-7);
+    }
+    EXPECT_NEAR(sum, 1, 1e-12);
+  }
+}
+
+TEST(Likelihood, RatioOfACandidateIsTheDenseOne) {
+  std::mt19937_64 random(test::seed() + 1);
+  for (int i = 0; i < 60; ++i) {
+    Observations o =
+        test::simulate({.runs_of_block = {3, 6, 4, 8, 5, 2, 7, 5}, .session_ratio = 0.2 * (i % 12)}, random);
+    MatrixXd column = normal(o.rows(), 1, random);
+    if (i % 2 == 0)  // constant within sessions
+      for (Index row = 0; row < o.rows(); ++row)
+        column(row) = std::cos(1.0 + o.block[static_cast<std::size_t>(row)]);
+    test::set_y(o, o.y + 0.0007 * (i % 5) * column);
+    const MixedModel model(o, test::all_rows(o));
+    const CandidateScan scan(model, {}, {{.columns = {{column}}}});
+    const NullFit null = scan.null_fit({o.y});
+    const CandidateFit fit = scan.fit({o.y})[0];
+    // Session variances above the null's are not tried.
+    const std::size_t start = null.ratio[0], lowest = start > 4 ? start - 4 : 0;
+    const DenseFit dense = best_of(o, o.y.col(0), column, lowest, start);
+    EXPECT_NEAR(fit.likelihood_ratio, std::max(0.0, dense.log_likelihood - null.log_likelihood), 1e-7);
+    EXPECT_NEAR(fit.amplitude(0), dense.amplitude(0), 1e-9);
+    const DenseFit anywhere = best_of(o, o.y.col(0), column, 0, kRatios.size() - 1);
+    EXPECT_LE(fit.likelihood_ratio, anywhere.log_likelihood - null.log_likelihood + 1e-7);
+  }
+}
+
+TEST(Likelihood, AdoptedColumnsStayIn) {
+  std::mt19937_64 random(test::seed() + 2);
+  const Observations o = test::simulate({.session_ratio = 0}, random);
+  const MatrixXd columns = normal(o.rows(), 2, random);
+  const MixedModel model(o, test::all_rows(o), {});
+  const Components first = {columns.col(0)}, second = {columns.col(1)};
+  const CandidateScan scan(model, {first}, {{.columns = {second}}});
+  const NullFit null = scan.null_fit({o.y});
+  const DenseFit without = dense_fit(o, o.y.col(0), columns.col(0), kRatios[null.ratio[0]]);
+  EXPECT_NEAR(null.log_likelihood, without.log_likelihood, 1e-8);
+  const DenseFit with = dense_fit(o, o.y.col(0), columns, kRatios[null.ratio[0]]);
+  if (null.ratio[0] == 0) {
+    EXPECT_NEAR(scan.fit({o.y})[0].likelihood_ratio, with.log_likelihood - without.log_likelihood, 1e-7);
+  }
+}
+
+TEST(Likelihood, EvidenceIsTheTailOfFisher) {
+  std::mt19937_64 random(test::seed() + 3);
+  Observations o = test::simulate({.session_ratio = 0}, random);
+  o.blocks_are_rows = true;  // no session variance: ordinary least squares
+  const MatrixXd column = normal(o.rows(), 1, random);
+  test::set_y(o, o.y + 0.0004 * column);
+  const MixedModel model(o, test::all_rows(o));
+  const CandidateFit fit = CandidateScan(model, {}, {{.columns = {{column}}}}).fit({o.y})[0];
+  const VectorXd y = o.y.col(0);
+  const MatrixXd x = test::dense_baseline(o, test::all_rows(o), test::all_rows(o));
+  MatrixXd all(x.rows(), x.cols() + 1);
+  all << x, column;
+  const auto rss = [&](const MatrixXd& m) {
+    return (y - m * m.colPivHouseholderQr().solve(y)).squaredNorm();
+  };
+  const double dof = static_cast<double>(model.dof(0));
+  const double f = (rss(x) - rss(all)) / rss(all) * (dof - 1);
+  EXPECT_NEAR(fit.evidence, -std::log10(f_upper_p(f, 1, dof - 1)), 0.01);
+  const auto weighted = CandidateScan(model, {}, {{.columns = {{column}}, .weight = 10}}).fit({o.y});
+  EXPECT_NEAR(weighted[0].evidence, fit.evidence + 1, 1e-9);
+}
+
+TEST(Likelihood, TheWrongSignIsNoEvidence) {
+  std::mt19937_64 random(test::seed() + 4);
+  Observations o = test::simulate({}, random);
+  const MatrixXd column = normal(o.rows(), 1, random);
+  test::set_y(o, o.y - 0.01 * column);
+  const MixedModel model(o, test::all_rows(o));
+  const auto fits =
+      CandidateScan(
+          model, {},
+          {{.columns = {{column}}, .sign = 1}, {.columns = {{column}}, .sign = -1}, {.columns = {{column}}}})
+          .fit({o.y});
+  EXPECT_EQ(fits[0].evidence, 0);
+  EXPECT_GT(fits[1].evidence, 5);
+  EXPECT_EQ(fits[1].evidence, fits[2].evidence);
+}
+
+TEST(Likelihood, FourRotorsFindWhatOneRotorHas) {
+  std::mt19937_64 random(test::seed() + 5);
+  Observations o = test::simulate({.channels = 4}, random);
+  MatrixXd one = MatrixXd::Zero(o.rows(), 4);
+  one.col(2) = normal(o.rows(), 1, random);
+  const MatrixXd all = one.col(2).replicate(1, 4);
+  test::set_y(o, o.y + 0.003 * one);
+  const MixedModel model(o, test::all_rows(o));
+  const auto fits = CandidateScan(model, {}, {{.columns = {{one}}}, {.columns = {{all}}}}).fit({o.y});
+  EXPECT_GT(fits[0].evidence, fits[1].evidence + 3);
+  EXPECT_NEAR(fits[0].amplitude(0), 0.003, 0.0015);
+}
+
+}  // namespace
+}  // namespace tunnelrig

@@ -1,0 +1,192 @@
+// The random part of the model against dense algebra.
+#include "analysis/residual/mixed_model.h"
+
+#include "analysis/residual/simulated.h"
+#include "support/seeds.h"
+
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Unequal blocks and groups; some runs are left out, as by a seal.
+struct MixedModelTest : testing::TestWithParam<int> {
+  std::mt19937_64 random{test::seed()};
+  Observations observations = test::simulate(
+      {.runs_of_block = {3, 7, 1, 5, 2, 6, 4}, .groups = 4, .channels = GetParam(), .shapes = 1}, random);
+  std::vector<int> rows, others;
+
+  MixedModelTest() {
+    for (int row = 0; row < static_cast<int>(observations.rows()); ++row)
+      (row > 4 && row % 5 == 0 ? others : rows).push_back(row);
+  }
+
+  MatrixXd draw(Index n, Index columns) {
+    std::normal_distribution<double> normal;
+    return MatrixXd::NullaryExpr(n, columns, [&] { return normal(random); });
+  }
+  static MatrixXd part(const MatrixXd& stacked, Index n, Index mode) {
+    return stacked.middleRows(mode * n, n);
+  }
+};
+
+TEST_P(MixedModelTest, StrataAreCommonAndDifferenceModesOfEveryComponent) {
+  const MixedModel model(observations, rows);
+  ASSERT_EQ(model.strata().size(), GetParam() == 1 ? 2u : 4u);
+  Index modes = 0;
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
+    modes += model.strata()[s].modes;
+    const auto fixed = model.strata()[s].means() ? 4 : 0;
+    EXPECT_EQ(model.dof(s), model.strata()[s].modes * (static_cast<Index>(rows.size()) - fixed));
+  }
+  EXPECT_EQ(modes, 2 * GetParam());
+  const MatrixXd& q = model.mode_matrix();
+  EXPECT_LT((q.transpose() * q - MatrixXd::Identity(q.rows(), q.cols())).norm(), 1e-12);
+  EXPECT_LT((q.col(0).array() - 1 / std::sqrt(GetParam())).matrix().norm(), 1e-12);
+}
+
+TEST_P(MixedModelTest, WhiteningIsTheInverseRootOfTheCovariance) {
+  const MixedModel model(observations, rows);
+  const auto n = static_cast<Index>(rows.size());
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
+    if (model.strata()[s].means()) continue;  // there the baseline is taken out as well
+    for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
+      Stacked columns = MatrixXd::Identity(n, n).replicate(model.strata()[s].modes, 1);
+      model.project(s, ratio, columns);
+      const MatrixXd v = test::dense_covariance(observations, rows, kRatios[ratio]);
+      const MatrixXd root = Eigen::SelfAdjointEigenSolver<MatrixXd>(v).operatorInverseSqrt();
+      for (Index mode = 0; mode < model.strata()[s].modes; ++mode)
+        EXPECT_LT((part(columns, n, mode) - root).norm(), 1e-10) << "ratio " << kRatios[ratio];
+    }
+  }
+}
+
+TEST_P(MixedModelTest, WhitenedSimulationsHaveTheIdentityAsCovariance) {
+  const MixedModel model(observations, rows);
+  constexpr std::size_t kSets = 20000;
+  const double sigma = 0.3;
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
+    if (model.strata()[s].means()) continue;
+    for (const std::size_t ratio : {std::size_t{0}, std::size_t{5}}) {
+      Stacked data = model.simulate(s, std::vector<double>(kSets, sigma),
+                                    std::vector<std::size_t>(kSets, ratio), random);
+      model.project(s, ratio, data);
+      const MatrixXd covariance = data * data.transpose() / (sigma * sigma * kSets);
+      const MatrixXd excess = covariance - MatrixXd::Identity(data.rows(), data.rows());
+      // standard errors 1/√N off the diagonal and √(2/N) on it
+      EXPECT_LT(excess.cwiseAbs().maxCoeff(), 5.5 * std::sqrt(2.0 / kSets)) << "ratio " << kRatios[ratio];
+    }
+  }
+}
+
+TEST_P(MixedModelTest, ProjectionTakesOutWhatTheBaselineCanAbsorb) {
+  observations.slopes = draw(observations.rows(), 1);
+  const MixedModel model(observations, rows);
+  const auto n = static_cast<Index>(rows.size());
+  const MatrixXd x = test::dense_baseline(observations, rows, rows);
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
+    if (!model.strata()[s].means()) continue;
+    for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
+      Stacked absorbed = x.replicate(model.strata()[s].modes, 1);
+      model.project(s, ratio, absorbed);
+      EXPECT_LT(absorbed.norm(), 1e-10);
+
+      const MatrixXd y = draw(n, 3);
+      Stacked projected = y.replicate(model.strata()[s].modes, 1);
+      model.project(s, ratio, projected);
+      const MatrixXd v = test::dense_covariance(observations, rows, kRatios[ratio]);
+      const MatrixXd root = Eigen::SelfAdjointEigenSolver<MatrixXd>(v).operatorInverseSqrt();
+      const MatrixXd wx = root * x, wy = root * y;
+      const MatrixXd residual = wy - wx * (wx.transpose() * wx).ldlt().solve(wx.transpose() * wy);
+      for (Index mode = 0; mode < model.strata()[s].modes; ++mode)
+        EXPECT_LT((part(projected, n, mode) - residual).norm(), 1e-9);
+    }
+  }
+}
+
+TEST_P(MixedModelTest, LogDeterminantsAreDenseOnes) {
+  const MixedModel model(observations, rows);
+  const MatrixXd x = test::dense_baseline(observations, rows, rows);
+  for (std::size_t s = 0; s < model.strata().size(); ++s)
+    for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
+      const MatrixXd v = test::dense_covariance(observations, rows, kRatios[ratio]);
+      double expected = std::log(v.determinant());
+      if (model.strata()[s].means()) expected += std::log((x.transpose() * v.ldlt().solve(x)).determinant());
+      EXPECT_NEAR(model.log_determinant(s, ratio), 0.5 * model.strata()[s].modes * expected, 1e-9);
+    }
+}
+
+TEST_P(MixedModelTest, BaselinePredictsAsDenseGeneralisedLeastSquares) {
+  observations.slopes = draw(observations.rows(), 1);
+  const MixedModel model(observations, rows);
+  const auto n = static_cast<Index>(rows.size()), wanted = static_cast<Index>(others.size());
+  const MatrixXd x = test::dense_baseline(observations, rows, rows),
+                 x_new = test::dense_baseline(observations, rows, others);
+  for (std::size_t s = 0; s < model.strata().size(); ++s)
+    for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
+      const Index modes = model.strata()[s].modes;
+      const MatrixXd y = draw(n * modes, 2);
+      const MatrixXd prediction = model.baseline_prediction(s, ratio, y, others);
+      const VectorXd variance = model.baseline_variance(s, ratio, others);
+      ASSERT_EQ(prediction.rows(), wanted * modes);
+      if (!model.strata()[s].means()) {
+        EXPECT_EQ(prediction.norm(), 0);
+        EXPECT_EQ(variance.norm(), 0);
+        continue;
+      }
+      const MatrixXd v = test::dense_covariance(observations, rows, kRatios[ratio]);
+      const MatrixXd information = x.transpose() * v.ldlt().solve(x);
+      for (Index mode = 0; mode < modes; ++mode) {
+        const MatrixXd expected =
+            x_new * information.ldlt().solve(x.transpose() * v.ldlt().solve(part(y, n, mode)));
+        EXPECT_LT((part(prediction, wanted, mode) - expected).norm(), 1e-9);
+      }
+      EXPECT_LT((variance - (x_new * information.inverse() * x_new.transpose()).diagonal()).norm(), 1e-9);
+    }
+}
+
+TEST_P(MixedModelTest, AGroupThatTheModelDoesNotHoldIsNotPredicted) {
+  std::erase_if(rows, [&](int row) { return observations.group[static_cast<std::size_t>(row)] == 2; });
+  const MixedModel model(observations, rows);
+  const auto all = test::all_rows(observations);
+  const MatrixXd y = draw(static_cast<Index>(rows.size()) * model.strata()[0].modes, 1);
+  const MatrixXd prediction = model.baseline_prediction(0, 3, y, all);
+  const VectorXd variance = model.baseline_variance(0, 3, all);
+  for (Index r = 0; r < observations.rows(); ++r) {
+    const bool unseen = observations.group[static_cast<std::size_t>(r)] == 2;
+    EXPECT_EQ(std::isnan(prediction(r, 0)), unseen);
+    EXPECT_EQ(std::isnan(variance(r)), unseen);
+  }
+}
+
+TEST(MixedModel, StackingRotatesTheRotorsIntoModes) {
+  std::mt19937_64 random(test::seed());
+  const Observations observations = test::simulate({.channels = 4}, random);
+  const std::vector<int> rows = {1, 4, 7};
+  const MixedModel model(observations, rows);
+  const Components y = {observations.y};
+  for (Index r = 0; r < 3; ++r) {
+    const Eigen::RowVectorXd run = observations.y.row(rows[static_cast<std::size_t>(r)]);
+    EXPECT_NEAR(model.stack(0, {&y})(r, 0), run.sum() / 2, 1e-12) << "the common mode is the mean times √4";
+    const Stacked differences = model.stack(1, {&y});
+    double squares = 0;
+    for (Index mode = 0; mode < 3; ++mode) squares += std::pow(differences(mode * 3 + r, 0), 2);
+    EXPECT_NEAR(squares, (run.array() - run.mean()).square().sum(), 1e-12);
+  }
+}
+
+TEST(MixedModel, BlocksOfSingleRowsHaveOneRatio) {
+  std::mt19937_64 random(test::seed());
+  Observations observations = test::simulate({.runs_of_block = std::vector<int>(20, 1)}, random);
+  observations.blocks_are_rows = true;
+  EXPECT_EQ(MixedModel(observations, test::all_rows(observations)).ratios(), 1u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Rotors, MixedModelTest, testing::Values(1, 4));
+
+}  // namespace
+}  // namespace tunnelrig

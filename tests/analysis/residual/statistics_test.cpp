@@ -1,0 +1,126 @@
+// False alarms, coverage and recovery over many simulated campaigns.
+#include "analysis/residual/attribution.h"
+#include "analysis/residual/simulated.h"
+#include "support/seeds.h"
+
+#include <algorithm>
+#include <iostream>
+
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::MatrixXd;
+
+struct Statistics : testing::Test {
+  std::mt19937_64 random{test::seed()};
+  void SetUp() override { std::cout << "seed " << test::seed() << "\n"; }
+
+  Observations campaign(double session_ratio, int channels, int shapes) {
+    Observations o = test::simulate({.runs_of_block = {7, 5, 8, 6, 6, 9, 5, 7, 6, 4, 8, 7},
+                                     .channels = channels,
+                                     .shapes = shapes,
+                                     .session_ratio = session_ratio},
+                                    random);
+    test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
+    test::add_covariate(o, "time_since_motor_start_s", 5, 400, random);
+    test::add_covariate(o, "air_pressure_Pa", 99000, 103000, random);
+    Covariate order{"run_order", MatrixXd(o.rows(), 1), true};
+    for (Eigen::Index row = 0; row < o.rows(); ++row) order.value(row, 0) = static_cast<double>(row);
+    o.covariates.push_back(order);
+    // pressure belongs to the day
+    MatrixXd& pressure = o.covariates[2].value;
+    for (Eigen::Index row = 1; row < o.rows(); ++row)
+      if (o.block[static_cast<std::size_t>(row)] == o.block[static_cast<std::size_t>(row - 1)])
+        pressure(row) = pressure(row - 1);
+    return o;
+  }
+
+  static std::vector<Candidate> candidates_of(const Observations& o) {
+    const auto rows = test::all_rows(o);
+    const MatrixXd predicted = predict_response(o, {}, rows);
+    std::vector<Candidate> candidates;
+    for (const Term& way : all_ways(test::every_effect(), o, rows)) {
+      const TermResponse response = respond(way, o, predicted);
+      if (response.derivative[0][0].norm() > 0) candidates.push_back({.columns = {response.derivative[0]}});
+    }
+    return candidates;
+  }
+};
+
+/// Largest distance of an empirical distribution from the uniform one.
+double kolmogorov(std::vector<double> p) {
+  std::sort(p.begin(), p.end());
+  double distance = 0;
+  const double n = static_cast<double>(p.size());
+  for (std::size_t i = 0; i < p.size(); ++i)
+    distance = std::max({distance, std::abs(p[i] - static_cast<double>(i) / n),
+                         std::abs(p[i] - static_cast<double>(i + 1) / n)});
+  return distance;
+}
+
+TEST_F(Statistics, POfANullCampaignIsUniform) {
+  constexpr std::size_t kCampaigns = 240, kSimulations = 149;
+  for (const double session_ratio : {0.0, 1.0, 6.0}) {
+    std::vector<double> all;
+    for (std::size_t i = 0; i < kCampaigns; ++i) {
+      const Observations o = campaign(session_ratio, 1, 0);
+      const MixedModel model(o, test::all_rows(o));
+      const CandidateScan scan(model, {}, candidates_of(o));
+      double largest = 0;
+      for (const CandidateFit& fit : scan.fit({o.y})) largest = std::max(largest, fit.evidence);
+      const auto maxima = scan.simulated_maxima(scan.null_fit({o.y}), kSimulations, random);
+      const auto above = std::count_if(maxima.begin(), maxima.end(), [&](double m) { return m >= largest; });
+      // a place among the simulated, drawn evenly within its step
+      const double step = std::uniform_real_distribution<double>(0, 1)(random);
+      all.push_back((static_cast<double>(above) + step) / (kSimulations + 1));
+    }
+    const double distance = kolmogorov(all);
+    const auto small = std::count_if(all.begin(), all.end(), [](double p) { return p <= 0.05; });
+    std::cout << "session ratio " << session_ratio << ": distance " << distance << ", p below 0.05 in "
+              << small << " of " << kCampaigns << "\n";
+    EXPECT_LT(distance, 1.63 / std::sqrt(static_cast<double>(kCampaigns)))
+        << "1 % of Kolmogorov's distribution";
+    EXPECT_LE(small, 24) << "binomial (240, 0.05): beyond 24 in 0.05 % of cases";
+  }
+}
+
+TEST_F(Statistics, NullCampaignsOfFourRotorsAreRarelyNamed) {
+  SearchSettings settings;
+  settings.simulations = 199;
+  settings.alpha = 0.02;
+  constexpr int kCampaigns = 100;
+  int named = 0;
+  for (int i = 0; i < kCampaigns; ++i) {
+    const Observations o = campaign(0.4 * (i % 4), 4, 0);
+    settings.seed = static_cast<std::uint64_t>(i + 1);
+    const Attribution found = attribute(o, test::all_rows(o), test::every_effect(), settings);
+    named += found.accepted.empty() ? 0 : 1;
+  }
+  std::cout << named << " of " << kCampaigns << " named\n";
+  EXPECT_LE(named, 7) << "binomial (100, 0.02): beyond 7 in 0.1 % of cases";
+}
+
+TEST_F(Statistics, FittedParametersScatterAsTheirErrorsSay) {
+  double squares = 0;
+  int inside = 0;
+  constexpr int kCampaigns = 200;
+  for (int i = 0; i < kCampaigns; ++i) {
+    Observations o = campaign(1, 1, 0);
+    test::add_effect(o, "supply_voltage", {0.4});
+    const auto rows = test::all_rows(o);
+    const Term start{.effect = &test::effect_named("supply_voltage"), .parameters = {0.2}};
+    const JointFit fit = fit_jointly(o, {{start}, {}}, rows);
+    const AmplitudeFit errors = fit_amplitudes(o, {o.y}, fit.linear.columns, fit.variances, rows);
+    const double z = (fit.model.terms[0].parameters[0] - 0.4) / std::sqrt(errors.covariance(0, 0));
+    squares += z * z;
+    inside += std::abs(z) < 1.96 ? 1 : 0;
+  }
+  std::cout << "z² " << squares / kCampaigns << ", inside " << inside << "\n";
+  EXPECT_NEAR(squares / kCampaigns, 1, 4 * std::sqrt(2.0 / kCampaigns));
+  EXPECT_NEAR(inside, 0.95 * kCampaigns, 13) << "four standard errors";
+}
+
+}  // namespace
+}  // namespace tunnelrig

@@ -1,0 +1,404 @@
+#include "simulated/usb_bus.h"
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <stdexcept>
+
+#include <fcntl.h>
+#include <linux/usbdevice_fs.h>
+#include <pthread.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <umockdev.h>
+#include <unistd.h>
+
+namespace tunnelrig::simulated {
+namespace {
+
+constexpr const char* kSysPath = "/sys/devices/usb1/1-1";
+constexpr int kFullSpeedPackets = 19;  // of 64 bytes in a frame of 1 ms
+
+/// One per process: libusb's udev and the testbed's preloaded library both keep global state.
+UMockdevTestbed* testbed() {
+  static UMockdevTestbed* bed = umockdev_testbed_new();
+  return bed;
+}
+
+int next_number() {
+  static int number = 1;
+  return ++number;
+}
+
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void require(bool good, GError* error) {
+  if (!good) throw std::runtime_error(error != nullptr ? error->message : "umockdev failed");
+}
+
+double seconds_of(clockid_t clock) {
+  timespec used{};
+  ::clock_gettime(clock, &used);
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+}
+
+std::string hex_descriptors(Board& board) {
+  std::string text;
+  for (const std::uint16_t value : {std::uint16_t{0x0100}, std::uint16_t{0x0200}}) {
+    std::array<std::uint8_t, 256> data{};
+    const int size = board.control(0x80, 6, value, 0, 255, data.data());
+    for (int i = 0; i < size; ++i) {
+      char byte[3];
+      std::snprintf(byte, sizeof byte, "%02x", data[static_cast<std::size_t>(i)]);
+      text += byte;
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+UsbBus::UsbBus(Board& board, Pace pace)
+    : board_(board), pace_(pace), handler_(umockdev_ioctl_base_new()), number_(1) {
+  testbed();
+  g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(on_ioctl), this);
+  worker_ = std::thread([this] { work(); });
+}
+
+UsbBus::~UsbBus() {
+  bool plugged = false;
+  {
+    const std::lock_guard lock(mutex_);
+    quit_ = true;
+    deaf_ = false;
+    plugged = !gone_;
+  }
+  wake_.notify_all();
+  worker_.join();
+  if (plugged) unplug();
+  g_object_unref(handler_);
+  if (gate_ >= 0) ::close(gate_);
+}
+
+/// A regular file is always ready to poll(), and libusb would spin; a FIFO is ready when we say so.
+void UsbBus::replace_node_by_gate() {
+  char* root = umockdev_testbed_get_root_dir(testbed());
+  const std::string path = root + node_;
+  g_free(root);
+  ::unlink(path.c_str());
+  umockdev_testbed_disable(testbed());
+  const bool made = ::mkfifo(path.c_str(), 0666) == 0;
+  const int gate = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
+  umockdev_testbed_enable(testbed());
+  require(made && gate >= 0, nullptr);
+  ::fcntl(gate, F_SETPIPE_SZ, 4096);  // one page: quickly filled and drained
+  const std::lock_guard lock(mutex_);
+  if (gate_ >= 0) ::close(gate_);
+  gate_ = gate;
+  gate_full_ = false;
+  show_ready(false);
+}
+
+void UsbBus::plug() {
+  std::string descriptors;
+  {
+    const std::lock_guard lock(mutex_);
+    number_ = next_number();
+    board_.enumerate();  // a kernel would have done it
+    descriptors = hex_descriptors(board_);
+    mangled_.clear();
+    mangled_used_ = 0;
+    clock_s_ = now_s();
+  }
+  char text[2048];
+  std::snprintf(text, sizeof text, "/dev/bus/usb/001/%03d", number_);
+  node_ = text;
+  std::snprintf(
+      text, sizeof text,
+      "P: /devices/usb1/1-1\nN: bus/usb/001/%03d\nE: DEVNAME=%s\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\n"
+      "E: BUSNUM=001\nE: DEVNUM=%03d\nE: MAJOR=189\nE: MINOR=%d\nE: PRODUCT=1209/1/100\nA: busnum=1\\n\n"
+      "A: devnum=%d\\n\nA: speed=12\\n\nA: bConfigurationValue=1\\n\nA: idVendor=1209\\n\nA: "
+      "idProduct=0001\\n\n"
+      "H: descriptors=%s\n",
+      number_, node_.c_str(), number_, number_ - 1, number_, descriptors.c_str());
+  GError* error = nullptr;
+  require(umockdev_testbed_add_from_string(testbed(), text, &error) != 0, error);
+  require(umockdev_testbed_attach_ioctl(testbed(), node_.c_str(), handler_, &error) != 0, error);
+  replace_node_by_gate();
+  {
+    const std::lock_guard lock(mutex_);
+    gone_ = false;
+  }
+  umockdev_testbed_uevent(testbed(), kSysPath, "add");
+}
+
+void UsbBus::unplug() {
+  {
+    const std::lock_guard lock(mutex_);
+    gone_ = true;
+    while (!pending_.empty()) {
+      usbdevfs_urb* urb = pending_.front();
+      pending_.pop_front();
+      complete(urb, -ESHUTDOWN);
+    }
+    show_ready(true);
+    board_.controller.reset();
+  }
+  umockdev_testbed_uevent(testbed(), kSysPath, "remove");
+  umockdev_testbed_detach_ioctl(testbed(), node_.c_str(), nullptr);
+  umockdev_testbed_remove_device(testbed(), kSysPath);
+}
+
+void UsbBus::set_deaf(bool deaf) {
+  const std::lock_guard lock(mutex_);
+  deaf_ = deaf;
+}
+
+void UsbBus::fail_transfer(int error, bool keep) {
+  const std::lock_guard lock(mutex_);
+  if (pending_.empty()) return;
+  usbdevfs_urb* urb = pending_.front();
+  pending_.pop_front();
+  if (!keep) urb->actual_length = 0;
+  complete(urb, -error);
+}
+
+void UsbBus::set_mangle(Mangle mangle) {
+  const std::lock_guard lock(mutex_);
+  mangle_ = std::move(mangle);
+}
+
+void UsbBus::with_board(const std::function<void(Board&)>& look) {
+  const std::lock_guard lock(mutex_);
+  look(board_);
+}
+
+double UsbBus::processor_s() {
+  clockid_t clock{};
+  ::pthread_getcpuclockid(worker_.native_handle(), &clock);
+  const std::lock_guard lock(mutex_);
+  return seconds_of(clock) + ioctl_processor_s_;
+}
+
+// --- everything below with the lock held, but for work() and on_ioctl()
+// -------------------------------------------
+
+void UsbBus::show_ready(bool ready) {
+  if (gate_ < 0 || ready != gate_full_) return;  // a full FIFO is not writable: nothing to reap
+  std::array<char, 4096> bytes{};
+  if (ready) {
+    while (::read(gate_, bytes.data(), bytes.size()) > 0) {
+    }
+  } else {
+    while (::write(gate_, bytes.data(), bytes.size()) > 0) {
+    }
+  }
+  gate_full_ = !ready;
+}
+
+void UsbBus::complete(usbdevfs_urb* urb, int status) {
+  urb->status = status;
+  done_[number_].push_back(urb);
+  show_ready(true);
+}
+
+/// Moves packets into `urb`; true where it is finished, with its status.
+bool UsbBus::fill(usbdevfs_urb& urb, int& budget, int& status) {
+  while (budget > 0) {
+    auto* to = static_cast<std::uint8_t*>(urb.buffer) + urb.actual_length;
+    const auto room = static_cast<std::size_t>(urb.buffer_length - urb.actual_length);
+    status = 0;
+    int size = 0;
+    if (mangle_) {
+      if (mangled_used_ == mangled_.size() && !mangled_end_) {
+        mangled_.clear();
+        mangled_used_ = 0;
+        std::array<std::uint8_t, USB_PACKET> packet{};
+        const int got = board_.controller.in_packet(packet.data(), packet.size());
+        if (got == kNak) return false;
+        if (got < 0) {
+          status = -EPIPE;
+          return true;
+        }
+        mangle_(packet.data(), static_cast<std::size_t>(got), mangled_);
+        mangled_end_ = got < USB_PACKET;
+      }
+      const std::size_t take = std::min(room, mangled_.size() - mangled_used_);
+      if (take > 0) std::memcpy(to, mangled_.data() + mangled_used_, take);
+      mangled_used_ += take;
+      size = static_cast<int>(take);
+      urb.actual_length += size;
+      --budget;
+      if (mangled_end_ && mangled_used_ == mangled_.size()) {
+        mangled_end_ = false;
+        return true;
+      }
+      if (urb.actual_length == urb.buffer_length) return true;
+      continue;
+    }
+    size = board_.controller.in_packet(to, room);
+    if (size == kNak) return false;
+    if (size < 0) {
+      status = size == kBabble ? -EOVERFLOW : -EPIPE;
+      return true;
+    }
+    --budget;
+    urb.actual_length += size;
+    if (size < USB_PACKET || urb.actual_length == urb.buffer_length) return true;
+  }
+  return false;
+}
+
+int UsbBus::service(int budget) {
+  const int before = budget;
+  while (!pending_.empty() && budget > 0) {
+    board_.poll();
+    int status = 0;
+    if (!fill(*pending_.front(), budget, status)) {
+      if (pace_ != Pace::kUnlimited || !board_.running() || ring_count(&board_.core.ring) < TRW_MAX_FRAMES)
+        break;
+      continue;  // only the transfer had ended; there is more in the ring
+    }
+    usbdevfs_urb* urb = pending_.front();
+    pending_.pop_front();
+    complete(urb, status);
+  }
+  return before - budget;
+}
+
+void UsbBus::step_clock(double now) {
+  if (pace_ == Pace::kUnlimited || pace_ == Pace::kFullSpeed) {
+    board_.fill();
+    return;
+  }
+  const double frame_s = 1 / board_.frame_rate_hz();
+  const auto frames = static_cast<std::uint64_t>(std::max(0.0, (now - clock_s_) / frame_s));
+  board_.advance(frames);
+  clock_s_ += static_cast<double>(frames) * frame_s;
+}
+
+void UsbBus::work() {
+  auto next = std::chrono::steady_clock::now();
+  std::unique_lock lock(mutex_);
+  while (!quit_) {
+    step_clock(now_s());
+    int moved = 0;
+    if (!gone_ && !deaf_) moved = service(pace_ == Pace::kFullSpeed ? kFullSpeedPackets : 2048);
+    if (pace_ == Pace::kUnlimited && moved > 0) {
+      lock.unlock();  // let the host in
+      std::this_thread::yield();
+      lock.lock();
+      continue;
+    }
+    if (pace_ == Pace::kUnlimited) {
+      wake_.wait_for(lock, std::chrono::milliseconds(1));
+    } else {
+      lock.unlock();
+      next += std::chrono::milliseconds(1);
+      std::this_thread::sleep_until(next);
+      lock.lock();
+    }
+  }
+}
+
+long UsbBus::submit(usbdevfs_urb* urb) {
+  urb->actual_length = 0;
+  urb->status = -EINPROGRESS;
+  if (deaf_ || urb->type != USBDEVFS_URB_TYPE_CONTROL) {
+    pending_.push_back(urb);
+    wake_.notify_all();
+    return 0;
+  }
+  auto* setup = static_cast<std::uint8_t*>(urb->buffer);
+  const int size = board_.controller.control(setup, setup + 8);
+  if (size >= 0) urb->actual_length = size;
+  complete(urb, size == kStall ? -EPIPE : size < 0 ? -EPROTO : 0);
+  return 0;
+}
+
+long UsbBus::discard(void* urb, int& error) {
+  for (auto at = pending_.begin(); at != pending_.end() && !deaf_; ++at) {
+    if (*at != urb) continue;
+    pending_.erase(at);
+    complete(static_cast<usbdevfs_urb*>(urb), -ENOENT);
+    return 0;
+  }
+  if (deaf_) return 0;  // accepted, and then nothing
+  error = gone_ ? ENODEV : EINVAL;
+  return -1;
+}
+
+long UsbBus::reap(void** urb, int number, bool dead, int& error) {
+  std::deque<usbdevfs_urb*>& done = done_[number];
+  if (done.empty()) {
+    error = dead ? ENODEV : EAGAIN;
+    if (!dead) show_ready(false);
+    return -1;
+  }
+  *urb = done.front();
+  done.pop_front();
+  if (done.empty() && !dead) show_ready(false);
+  return 0;
+}
+
+long UsbBus::ioctl(unsigned long request, void* argument, int number, int& error) {
+  const bool dead = gone_ || number != number_;
+  if (request == static_cast<unsigned>(USBDEVFS_REAPURBNDELAY))
+    return reap(static_cast<void**>(argument), number, dead, error);
+  if (request == static_cast<unsigned>(USBDEVFS_GET_CAPABILITIES)) {
+    *static_cast<std::uint32_t*>(argument) =
+        USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
+    return 0;
+  }
+  if (request == static_cast<unsigned>(USBDEVFS_DISCARDURB)) return discard(argument, error);
+  if (dead) {
+    error = ENODEV;
+    return -1;
+  }
+  switch (request) {
+    case static_cast<unsigned>(USBDEVFS_SUBMITURB):
+      return submit(static_cast<usbdevfs_urb*>(argument));
+    case static_cast<unsigned>(USBDEVFS_CLAIMINTERFACE):
+    case static_cast<unsigned>(USBDEVFS_RELEASEINTERFACE):
+      return 0;
+    case static_cast<unsigned>(USBDEVFS_CLEAR_HALT):
+      board_.control(0x02, 1, 0, static_cast<std::uint16_t>(*static_cast<unsigned*>(argument)), 0, nullptr);
+      return 0;
+    default:
+      error = ENOTTY;
+      return -1;
+  }
+}
+
+int UsbBus::on_ioctl(_UMockdevIoctlBase* /*base*/, _UMockdevIoctlClient* client, void* context) {
+  auto& self = *static_cast<UsbBus*>(context);
+  const unsigned long request = static_cast<unsigned>(umockdev_ioctl_client_get_request(client));
+  void* argument = *reinterpret_cast<void**>(umockdev_ioctl_client_get_arg(client)->data);
+  const int number = std::atoi(umockdev_ioctl_client_get_devnode(client) + std::strlen("/dev/bus/usb/001/"));
+  int error = 0;
+  long result = 0;
+  {
+    const std::lock_guard lock(self.mutex_);
+    result = self.ioctl(request, argument, number, error);
+    self.ioctl_processor_s_ = seconds_of(CLOCK_THREAD_CPUTIME_ID);
+  }
+  umockdev_ioctl_client_complete(client, result, error);
+  return 1;
+}
+
+}  // namespace tunnelrig::simulated
+
+#ifdef __SANITIZE_THREAD__
+// What a kernel would do, ThreadSanitizer does not see as handing memory over: it comes by umockdev's own
+// ways. Races between the logger's threads are still found.
+extern "C" const char* __tsan_default_suppressions();
+extern "C" const char* __tsan_default_suppressions() {
+  return "race:tunnelrig::simulated::UsbBus\nrace:libumockdev.so\n";
+}
+#endif
