@@ -42,12 +42,50 @@ std::vector<std::string> controllers_of(const Options& options) {
   return names;
 }
 
-/// Flies one scenario; `gains` and `map` are shared by all.
-FlownScenario fly_scenario(const Options& options, const std::string& tunnel,
-                           const std::string& scenario_name, const NamedMap& map, const GainTable& gains) {
+struct PlaceAndPath {
+  std::string tunnel, scenario;
+};
+
+std::vector<PlaceAndPath> programme_of(const Options& options) {
+  if (options.scenario != "all") {
+    std::string tunnel = options.tunnel;
+    if (tunnel.empty()) tunnel = tunnel_of_scenario(options.scenario);
+    return {{tunnel.empty() ? "1.5" : tunnel, options.scenario}};
+  }
+  if (!options.tunnel.empty())
+    throw InputError("--scenario all flies in the thesis's tunnels: --tunnel does not go with it");
+  return {{"2.4", "hover"},  {"2.4", "diagonal"}, {"2.4", "ladder"},
+          {"2.4", "circle"}, {"1.5", "circle"},   {"railway", "waypoints"}};
+}
+
+/// Everything that can be refused, before anything is flown or printed.
+void check_all(const Options& options, const std::vector<PlaceAndPath>& wanted, const GainTable& gains) {
+  for (const std::string& name : controllers_of(options)) AnyController(name, gains, {});
   const Airframe frame;
-  const FlightSpace space(tunnel_from(tunnel), frame);
-  const Scenario scenario = scenario_from(scenario_name, space, frame);
+  for (const PlaceAndPath& one : wanted) {
+    const FlightSpace space(tunnel_from(one.tunnel), frame);
+    scenario_from(one.scenario, space, frame);
+  }
+}
+
+/// One vehicle that is as it is believed to be but for what is hidden, flown again and again: each flight has
+/// its own air and sensors.
+std::vector<FlightLog> identification_flights(FlightTask task, const std::string& controller,
+                                              const GainTable& gains) {
+  constexpr int kMost = 12;
+  task.spread.mass = task.spread.rotor_thrust = task.spread.map_errors = 0;
+  std::vector<FlightLog> flights;
+  for (int run = 0; run < std::min(task.runs, kMost); ++run)
+    flights.push_back(fly_logged(task, controller, gains, run));
+  return flights;
+}
+
+/// Flies one scenario; `gains` and `map` are shared by all.
+FlownScenario fly_scenario(const Options& options, const PlaceAndPath& one, const NamedMap& map,
+                           const GainTable& gains) {
+  const Airframe frame;
+  const FlightSpace space(tunnel_from(one.tunnel), frame);
+  const Scenario scenario = scenario_from(one.scenario, space, frame);
   FlightTask task{
       .space = &space, .scenario = &scenario, .map = &map.map, .believed = frame, .hidden = options.hidden};
   task.runs = options.runs;
@@ -69,7 +107,9 @@ FlownScenario fly_scenario(const Options& options, const std::string& tunnel,
       progress.show(static_cast<double>(i) * options.runs + done,
                     static_cast<double>(names.size()) * options.runs, names[i]);
     }));
-    if (!options.out.empty()) flown.logs.push_back(fly_logged(task, names[i], gains));
+    if (options.out.empty()) continue;
+    flown.logs.push_back(fly_logged(task, names[i], gains));
+    flown.identification.push_back(identification_flights(task, names[i], gains));
   }
   if (!options.out.empty()) {
     const bool all = options.scenario == "all";
@@ -78,6 +118,7 @@ FlownScenario fly_scenario(const Options& options, const std::string& tunnel,
     write_flown(folder, flown, task, warning);
     if (!warning.empty()) warn(warning);
     flown.logs.clear();
+    flown.identification.clear();
   }
   return flown;
 }
@@ -110,25 +151,15 @@ int run(const Options& options) {
   const GainTable gains =
       options.gains.empty() ? frozen_gains() : parse_gains(read_text(options.gains), options.gains);
   const bool programme = options.scenario == "all";
+  const std::vector<PlaceAndPath> wanted = programme_of(options);
+  check_all(options, wanted, gains);
   std::vector<FlownScenario> flown;
   fmt::print("SIMULATED flights; map: {}\n\n", map.name);
-  if (programme) {
-    for (const auto& [tunnel, scenario] :
-         std::initializer_list<std::pair<const char*, const char*>>{{"2.4", "hover"},
-                                                                    {"2.4", "diagonal"},
-                                                                    {"2.4", "ladder"},
-                                                                    {"2.4", "circle"},
-                                                                    {"1.5", "circle"},
-                                                                    {"railway", "waypoints"}}) {
-      flown.push_back(fly_scenario(options, tunnel, scenario, map, gains));
-      print_flown(flown.back());
-    }
-    print_beside_thesis(flown);
-  } else {
-    flown.push_back(
-        fly_scenario(options, options.tunnel.empty() ? "1.5" : options.tunnel, options.scenario, map, gains));
+  for (const PlaceAndPath& one : wanted) {
+    flown.push_back(fly_scenario(options, one, map, gains));
     print_flown(flown.back());
   }
+  if (programme) print_beside_thesis(flown);
   if (!options.json.empty()) write_text(options.json, flown_json(flown, map.name, options.seed, programme));
   return kWell;
 }
@@ -146,9 +177,10 @@ void add_fly(CLI::App& app, Work& work) {
       "          tunnelrig fly --tune gains.toml && tunnelrig fly --gains gains.toml");
   verb->add_option("--map", options->map, "disturbance_map.json; without it the published field, simulated");
   verb->add_option("--tunnel", options->tunnel, "1.5, 2.4, railway or a file (default 1.5)");
-  verb->add_option(
-          "--scenario", options->scenario,
-          "hover, diagonal, ladder, circle, waypoints, training, a file, or all (the thesis's programme)")
+  verb->add_option("--scenario", options->scenario,
+                   "hover, diagonal, ladder, circle, waypoints, training, identification, a file, or all "
+                   "(the thesis's "
+                   "programme)")
       ->capture_default_str();
   verb->add_option("--controllers", options->controllers, "Names with commas between; all of them otherwise")
       ->delimiter(',');
@@ -177,6 +209,8 @@ void add_fly(CLI::App& app, Work& work) {
   verb->add_option("--map-scale", options->hidden.map_scale,
                    "Undeclared: the field is so many times the map");
   verb->add_option("--wind-m-s", options->hidden.wind_m_s, "Undeclared: steady wind along the tunnel");
+  verb->add_option("--gust-m-s", options->hidden.gust_m_s,
+                   "Undeclared: gusts along the tunnel, standard deviation");
   verb->add_option("--motor-loss", options->hidden.motor_loss,
                    "Undeclared: share of its thrust that a rotor lost");
   verb->add_option("--weak-rotor", options->hidden.weak_rotor, "Which rotor that is, 1 to 4");

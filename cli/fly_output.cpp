@@ -159,10 +159,12 @@ std::vector<std::filesystem::path> write_flown(const std::filesystem::path& fold
   for (std::size_t i = 0; i < flown.logs.size(); ++i) {
     const std::string& name = flown.controllers[i].controller;
     write(name + ".csv", format_log(flown.logs[i]));
-    write(name + "-residual.csv", format_residuals(flown.logs[i], task.believed));
+    write(name + "-residual.csv", format_residuals(flown.identification[i], task.believed));
   }
-  for (const char* response : {"lift", "vertical", "lateral", "roll", "pitch"})
+  for (const char* response : {"vertical", "lateral", "roll", "pitch"}) {
     write(fmt::format("residual-{}.toml", response), residual_schema(response));
+    write(fmt::format("effects-{}.toml", response), residual_effects(response, task.believed));
+  }
   if (!flown.logs.empty()) {
     for (auto& file : draw_flown(folder, flown, task, warning)) files.push_back(std::move(file));
   }

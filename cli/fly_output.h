@@ -13,7 +13,8 @@ namespace tunnelrig::cli {
 struct FlownScenario {
   std::string tunnel, scenario;
   std::vector<Comparison> controllers;
-  std::vector<FlightLog> logs;  // the first run of each controller; may be empty
+  std::vector<FlightLog> logs;                         // the first run of each controller; may be empty
+  std::vector<std::vector<FlightLog>> identification;  // by controller, for the residual tables; may be empty
 };
 
 void print_flown(const FlownScenario& flown);

@@ -46,7 +46,8 @@ Scan SimulatedLidar::sweep(const LidarPose& start, const LidarPose& end) {
   for (std::size_t i = 0; i < directions_.size(); ++i) {
     const double t = static_cast<double>(i) / static_cast<double>(directions_.size() - 1);
     const SectionPoint from = start.position + t * (end.position - start.position);
-    scan.range_m.push_back(static_cast<float>(measured_m(range_m(from, (first + t * change) * directions_[i]))));
+    scan.range_m.push_back(
+        static_cast<float>(measured_m(range_m(from, (first + t * change) * directions_[i]))));
   }
   return scan;
 }

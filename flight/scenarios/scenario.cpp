@@ -16,8 +16,8 @@ namespace tunnelrig {
 namespace {
 
 constexpr double kTurn_rad = 2 * std::numbers::pi;
-constexpr std::array<std::string_view, 6> kNames = {"hover",  "diagonal",  "ladder",
-                                                    "circle", "waypoints", "training"};
+constexpr std::array<std::string_view, 7> kNames = {"hover",     "diagonal", "ladder",        "circle",
+                                                    "waypoints", "training", "identification"};
 
 /// Where the centre of the vehicle can be: ± reach about the middle of the bounding box.
 struct Room {
@@ -96,9 +96,30 @@ Trajectory training(const Room& room) {
   return path;
 }
 
+/// Quick up and down at three heights, so that place and acceleration do not go together: what the residual
+/// depends on can be told apart.
+Trajectory identification(const Room& room) {
+  constexpr int kTurns = 6;
+  constexpr double kRate_rad_s = 3.7, kDuration_s = kTurns * kTurn_rad / kRate_rad_s;
+  const Plane amplitude = {0.5 * room.reach[0], 0.2 * room.reach[1]};
+  Trajectory path;
+  path.hold(room.at(0, -0.5 + 0.2), 2);
+  for (const double z_norm : {-0.5, 0.0, 0.5}) {
+    if (z_norm > -0.5) path.move(room.at(0, z_norm + 0.2), 1);
+    path.figure(room.at(0, z_norm), amplitude, {5 * kTurn_rad / 2 / kDuration_s, kRate_rad_s}, kDuration_s);
+  }
+  return path;
+}
+
 }  // namespace
 
 std::span<const std::string_view> scenario_names() { return kNames; }
+
+std::string tunnel_of_scenario(const std::string& name) {
+  if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return {};
+  if (!std::filesystem::is_regular_file(name)) return {};  // scenario_from says what is wrong
+  return parse_scenario(read_text(name), name).tunnel;
+}
 
 Scenario scenario_from(const std::string& name, const FlightSpace& space, const Airframe& frame) {
   const SectionScale scale = space.scale(frame);
@@ -116,6 +137,8 @@ Scenario scenario_from(const std::string& name, const FlightSpace& space, const 
     scenario.trajectory = waypoints(room);
   } else if (name == "training") {
     scenario.trajectory = training(room);
+  } else if (name == "identification") {
+    scenario.trajectory = identification(room);
   } else if (std::filesystem::is_regular_file(name)) {
     scenario = parse_scenario(read_text(name), name);
   } else {

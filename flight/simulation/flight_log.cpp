@@ -11,7 +11,7 @@ namespace tunnelrig {
 void FlightLog::reserve(double duration_s) {
   const auto cycles = static_cast<std::size_t>(duration_s * kControlRate_Hz) + 1;
   rows.reserve(cycles / static_cast<std::size_t>(every) + 1);
-  residuals.reserve(cycles / 40 + 1);
+  residuals.reserve(cycles / 600 + 1);
 }
 
 std::string format_log(const FlightLog& log) {

@@ -5,6 +5,7 @@
 #include "flight/controllers/controller.h"
 #include "flight/vehicle/motors.h"
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,11 +18,10 @@ struct LogRow {
   double roll_rad = 0, roll_target_rad = 0, thrust_m_s2 = 0, x_m = 0;
 };
 
-/// Means over a tenth of a second. Predictions rest on the believed vehicle and the measured map;
-/// measurements on the simulated inertial sensors.
+/// Mean over half a second, one in one and a half. Predictions rest on the believed
+/// vehicle and the measured map; measurements on the simulated inertial sensors.
 struct ResidualRow {
   double time_s = 0;
-  int block = 0;  // five seconds each
   double y_norm = 0, z_norm = 0;
   Plane residual_m_s2{};  // measured less predicted acceleration in y and z
   double roll_residual_rad_s2 = 0, pitch_residual_rad_s2 = 0;
@@ -43,10 +43,14 @@ struct FlightLog {
 /// CSV with a header; lengths in metres, angles in radians.
 std::string format_log(const FlightLog& log);
 
-/// The residual table as `tunnelrig import --format table` reads it, in newtons and newton metres of the
-/// believed vehicle, and its schema (docs/tables.md) for one response: "lift" (measured lift beside the
-/// predicted one), or the residual "vertical", "lateral", "roll" or "pitch". Throws InputError for another.
-std::string format_residuals(const FlightLog& log, const Airframe& believed);
+/// The residual table of several flights as `tunnelrig import --format table` reads it, in newtons and newton
+/// metres of the believed vehicle, and its schema (docs/tables.md) for one response: "vertical", "lateral",
+/// "roll" or "pitch". Throws InputError for another.
+std::string format_residuals(std::span<const FlightLog> flights, const Airframe& believed);
 std::string residual_schema(std::string_view response);
+
+/// What a vehicle, its air or its map may have that nobody declared and that shows in this response:
+/// candidates for `tunnelrig explain --effects`.
+std::string residual_effects(std::string_view response, const Airframe& believed);
 
 }  // namespace tunnelrig

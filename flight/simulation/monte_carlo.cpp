@@ -63,6 +63,7 @@ class Worker {
       bias = spread.accelerometer_bias_m_s2 * random.normal();
     setup_.air = task_.air;
     setup_.air.wind_m_s += hidden.wind_m_s;
+    setup_.air.gust_m_s = std::hypot(setup_.air.gust_m_s, hidden.gust_m_s);
     if (task_.map == nullptr) return;
     const double thrust_error = spread.map_errors * random.normal(),
                  uneven_error = spread.map_errors * random.normal();
@@ -147,6 +148,7 @@ void HiddenTruth::validate() const {
   require(payload_kg >= 0 && payload_kg <= 2, "payload_kg", payload_kg, "must be from 0 to 2");
   require(map_scale >= -5 && map_scale <= 5, "map_scale", map_scale, "must be from -5 to 5");
   require(std::abs(wind_m_s) <= 15, "wind_m_s", wind_m_s, "must be from -15 to 15");
+  require(gust_m_s >= 0 && gust_m_s <= 10, "gust_m_s", gust_m_s, "must be from 0 to 10");
   require(motor_loss >= 0 && motor_loss <= 0.3, "motor_loss", motor_loss, "must be from 0 to 0.3");
   require(weak_rotor >= 1 && weak_rotor <= 4, "weak_rotor", weak_rotor, "must be from 1 to 4");
 }

@@ -18,6 +18,7 @@ struct HiddenTruth {
   double payload_kg = 0;
   double map_scale = 1;   // of the field against the map
   double wind_m_s = 0;    // steady, along the tunnel
+  double gust_m_s = 0;    // standard deviation along the tunnel, beside the air's own
   double motor_loss = 0;  // share of its thrust that rotor `weak_rotor` (1 to 4) lost
   int weak_rotor = 1;
 

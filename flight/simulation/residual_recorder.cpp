@@ -3,8 +3,10 @@
 namespace tunnelrig {
 namespace {
 
-constexpr int kCyclesPerRow = 40;
-constexpr double kBlock_s = 5;
+constexpr int kCyclesPerRow = 200;
+// The rotors' unsteadiness lasts for a third of a second: rows that follow at once would not be independent.
+constexpr int kCyclesBetweenRows = 400;
+constexpr double kSettled_s = 2;  // a path may begin with a jump of velocity
 
 }  // namespace
 
@@ -36,10 +38,12 @@ void ResidualRecorder::predict(const ControlInput& in, const PerRotor& thrust_N,
                added_left_N = left_N * (walls.left_factor() - 1);
   p.map_thrust_m_s2 = (added_right_N + added_left_N) / frame.mass_kg;
   p.map_roll_rad_s2 = frame.rotor_offset_m() * (added_right_N - added_left_N) / frame.inertia_kg_m2[0];
-  const double thrust = p.thrust_m_s2 + p.map_thrust_m_s2;
-  const double drag_y = frame.linear_drag_N_s_m[0] / frame.mass_kg * in.velocity_m_s[0];
-  const double drag_z = frame.linear_drag_N_s_m[1] / frame.mass_kg * in.velocity_m_s[1];
-  p.residual_m_s2 = {-thrust * in.sin_roll - drag_y, thrust * in.cos_tilt - kGravity_m_s2 - drag_z};
+  const auto& [vy, vz] = in.velocity_m_s;
+  const double across = frame.linear_drag_N_s_m[0] / frame.mass_kg,
+               along = frame.linear_drag_N_s_m[1] / frame.mass_kg;
+  const double axial =
+      p.thrust_m_s2 + p.map_thrust_m_s2 - (along - across) * (vz * in.cos_tilt - vy * in.sin_roll);
+  p.residual_m_s2 = {-axial * in.sin_roll - across * vy, axial * in.cos_tilt - kGravity_m_s2 - across * vz};
   p.roll_residual_rad_s2 =
       (mean.moment_N_m[0] - frame.rate_damping_N_m_s[0] * sense.rate_rad_s[0]) / frame.inertia_kg_m2[0] +
       p.map_roll_rad_s2;
@@ -62,7 +66,11 @@ void ResidualRecorder::cycle(long cycle, const ControlInput& in, const ControlOu
                           out.thrust_m_s2,
                           truth.position_m[0]});
   }
-  if (has_prediction_) {  // the measurement is of the cycle that has gone by
+  // Another phase of the path in every flight
+  const long turn = (cycle + 137 * static_cast<long>(setup_.stream)) % (kCyclesPerRow + kCyclesBetweenRows);
+  const bool resting =
+      time_s < kSettled_s || turn < kCyclesBetweenRows || (in_sum_ == 0 && turn > kCyclesBetweenRows);
+  if (has_prediction_ && !resting) {  // the measurement is of the cycle that has gone by
     const ResidualRow& p = predicted_;
     const auto add = [](double& sum, double value) { sum += value / kCyclesPerRow; };
     add(sum_.y_norm, p.y_norm);
@@ -80,7 +88,6 @@ void ResidualRecorder::cycle(long cycle, const ControlInput& in, const ControlOu
     for (std::size_t i = 0; i < kRotors; ++i) add(sum_.rotor_thrust_N[i], p.rotor_thrust_N[i]);
     if (++in_sum_ == kCyclesPerRow) {
       sum_.time_s = time_s;
-      sum_.block = static_cast<int>(time_s / kBlock_s);
       log_->residuals.push_back(sum_);
       sum_ = {};
       in_sum_ = 0;

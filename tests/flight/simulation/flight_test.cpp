@@ -105,10 +105,12 @@ TEST_F(Flights, APayloadIsInTheVerticalResidualAndNothingElse) {
 }
 
 TEST_F(Flights, ResidualTablesNameTheirColumns) {
-  const FlightLog log = flown(quiet(), "ibs");
-  const std::string table = format_residuals(log, frame);
-  for (const char* response : {"lift", "vertical", "lateral", "roll", "pitch"})
+  const std::vector<FlightLog> flights(2, flown(quiet(), "ibs"));
+  const std::string table = format_residuals(flights, frame);
+  for (const char* response : {"vertical", "lateral", "roll", "pitch"}) {
     EXPECT_NE(residual_schema(response).find("tunnelrig-table/1"), std::string::npos);
+    EXPECT_NE(residual_effects(response, frame).find("[[effects]]"), std::string::npos);
+  }
   EXPECT_EQ(table.find("nan"), std::string::npos);
   EXPECT_THROW(residual_schema("yaw"), std::exception);
 }
