@@ -20,6 +20,7 @@ void add_reduce(CLI::App& app, Work& run);
 void add_map(CLI::App& app, Work& run);
 void add_report(CLI::App& app, Work& run);
 void add_explain(CLI::App& app, Work& run);
+void add_fly(CLI::App& app, Work& run);
 void add_models(CLI::App& app, Work& run);
 void add_doctor(CLI::App& app, Work& run);
 void add_devices(CLI::App& app, Work& run);

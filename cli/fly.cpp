@@ -1,0 +1,220 @@
+// tunnelrig fly: controllers through the thesis's scenarios in the simulated tunnel.
+#include "cli/console.h"
+#include "cli/fly_output.h"
+#include "cli/verb.h"
+#include "datasets/csv.h"
+#include "datasets/error.h"
+#include "flight/tuning/tuner.h"
+
+#include <cmath>
+#include <memory>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace tunnelrig::cli {
+namespace {
+
+struct Options {
+  std::string map, tunnel, scenario = "circle", gains, json, out, tune, position = "lidar";
+  std::vector<std::string> controllers;
+  int runs = 20, workers = 0, budget = 300;
+  std::uint64_t seed = 1;
+  double lidar_sigma_mm = 10;
+  HiddenTruth hidden;
+};
+
+struct NamedMap {
+  DisturbanceMap map;
+  std::string name;
+};
+
+NamedMap map_of(const Options& options) {
+  if (options.map.empty())
+    return {published_disturbance_map(), "published_field (simulated; no measured map was given)"};
+  return {read_disturbance_map(options.map), options.map};
+}
+
+std::vector<std::string> controllers_of(const Options& options) {
+  if (!options.controllers.empty()) return options.controllers;
+  std::vector<std::string> names;
+  for (const ControllerKind& kind : controller_kinds()) names.emplace_back(kind.name);
+  return names;
+}
+
+struct PlaceAndPath {
+  std::string tunnel, scenario;
+};
+
+std::vector<PlaceAndPath> programme_of(const Options& options) {
+  if (options.scenario != "all") {
+    std::string tunnel = options.tunnel;
+    if (tunnel.empty()) tunnel = tunnel_of_scenario(options.scenario);
+    return {{tunnel.empty() ? "1.5" : tunnel, options.scenario}};
+  }
+  if (!options.tunnel.empty())
+    throw InputError("--scenario all flies in the thesis's tunnels: --tunnel does not go with it");
+  return {{"2.4", "hover"},  {"2.4", "diagonal"}, {"2.4", "ladder"},
+          {"2.4", "circle"}, {"1.5", "circle"},   {"railway", "waypoints"}};
+}
+
+/// Everything that can be refused, before anything is flown or printed.
+void check_all(const Options& options, const std::vector<PlaceAndPath>& wanted, const GainTable& gains) {
+  for (const std::string& name : controllers_of(options)) AnyController(name, gains, {});
+  const Airframe frame;
+  for (const PlaceAndPath& one : wanted) {
+    const FlightSpace space(tunnel_from(one.tunnel), frame);
+    scenario_from(one.scenario, space, frame);
+  }
+}
+
+/// One vehicle that is as it is believed to be but for what is hidden, flown again and again: each flight has
+/// its own air and sensors.
+std::vector<FlightLog> identification_flights(FlightTask task, const std::string& controller,
+                                              const GainTable& gains) {
+  constexpr int kMost = 12;
+  task.spread.mass = task.spread.rotor_thrust = task.spread.map_errors = 0;
+  std::vector<FlightLog> flights;
+  for (int run = 0; run < std::min(task.runs, kMost); ++run)
+    flights.push_back(fly_logged(task, controller, gains, run));
+  return flights;
+}
+
+/// Flies one scenario; `gains` and `map` are shared by all.
+FlownScenario fly_scenario(const Options& options, const PlaceAndPath& one, const NamedMap& map,
+                           const GainTable& gains) {
+  const Airframe frame;
+  const FlightSpace space(tunnel_from(one.tunnel), frame);
+  const Scenario scenario = scenario_from(one.scenario, space, frame);
+  FlightTask task{
+      .space = &space, .scenario = &scenario, .map = &map.map, .believed = frame, .hidden = options.hidden};
+  task.runs = options.runs;
+  task.workers = options.workers;
+  task.seed = options.seed;
+  if (options.position == "given") {
+    task.localisation.reset();
+  } else {
+    task.localisation->lidar.range_sigma_m = 1e-3 * options.lidar_sigma_mm;
+  }
+  const std::string extrapolated = extrapolation(map.map.geometry, space, frame);
+  if (!extrapolated.empty()) warn("extrapolated, in normalised coordinates: " + extrapolated);
+
+  FlownScenario flown{.tunnel = space.tunnel.name, .scenario = scenario.name};
+  const std::vector<std::string> names = controllers_of(options);
+  ProgressBar progress("flying");
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    flown.controllers.push_back(fly_runs(task, names[i], gains, [&](int done) {
+      progress.show(static_cast<double>(i) * options.runs + done,
+                    static_cast<double>(names.size()) * options.runs, names[i]);
+    }));
+    if (options.out.empty()) continue;
+    flown.logs.push_back(fly_logged(task, names[i], gains));
+    flown.identification.push_back(identification_flights(task, names[i], gains));
+  }
+  if (!options.out.empty()) {
+    const bool all = options.scenario == "all";
+    const auto folder = std::filesystem::path(options.out) / (all ? flown.tunnel + "-" + flown.scenario : "");
+    std::string warning;
+    write_flown(folder, flown, task, warning);
+    if (!warning.empty()) warn(warning);
+    flown.logs.clear();
+    flown.identification.clear();
+  }
+  return flown;
+}
+
+int tune_all(const Options& options) {
+  const NamedMap map = map_of(options);
+  TuningSettings settings{.budget = options.budget, .workers = options.workers};
+  std::vector<Tuned> tuned;
+  for (const ControllerKind& kind : controller_kinds()) {
+    const std::string name(kind.name);
+    const auto wanted = std::find(options.controllers.begin(), options.controllers.end(), name);
+    if (!kind.tuned || (!options.controllers.empty() && wanted == options.controllers.end())) continue;
+    ProgressBar progress("tuning " + name);
+    tuned.push_back(tune(name, map.map, settings, [&](int done) { progress.show(done, settings.budget); }));
+    fmt::print("{}: cost {:.2f} mm, {:.2f} mm with the defaults\n", name, 1e3 * tuned.back().cost_m,
+               1e3 * tuned.back().start_cost_m);
+  }
+  write_text(options.tune,
+             format_gains(tuned, fmt::format("# Made by: {}\n# Map: {}. docs/flight.md says how.\n",
+                                             arguments(), map.name)));
+  return kWell;
+}
+
+int run(const Options& options) {
+  options.hidden.validate();
+  if (options.position != "lidar" && options.position != "given")
+    throw InputError(fmt::format("--position {}: must be lidar or given", options.position));
+  if (!options.tune.empty()) return tune_all(options);
+  const NamedMap map = map_of(options);
+  const GainTable gains =
+      options.gains.empty() ? frozen_gains() : parse_gains(read_text(options.gains), options.gains);
+  const bool programme = options.scenario == "all";
+  const std::vector<PlaceAndPath> wanted = programme_of(options);
+  check_all(options, wanted, gains);
+  std::vector<FlownScenario> flown;
+  fmt::print("SIMULATED flights; map: {}\n\n", map.name);
+  for (const PlaceAndPath& one : wanted) {
+    flown.push_back(fly_scenario(options, one, map, gains));
+    print_flown(flown.back());
+  }
+  if (programme) print_beside_thesis(flown);
+  if (!options.json.empty()) write_text(options.json, flown_json(flown, map.name, options.seed, programme));
+  return kWell;
+}
+
+}  // namespace
+
+void add_fly(CLI::App& app, Work& work) {
+  auto options = std::make_shared<Options>();
+  CLI::App* verb =
+      app.add_subcommand("fly", "Fly a map: controllers through the thesis's scenarios, simulated");
+  verb->footer(
+      "Everything flown is simulated; docs/flight.md.\n\n"
+      "Examples: tunnelrig fly --map maps/disturbance_map.json --scenario circle --out flights\n"
+      "          tunnelrig fly --scenario all\n"
+      "          tunnelrig fly --tune gains.toml && tunnelrig fly --gains gains.toml");
+  verb->add_option("--map", options->map, "disturbance_map.json; without it the published field, simulated");
+  verb->add_option("--tunnel", options->tunnel, "1.5, 2.4, railway or a file (default 1.5)");
+  verb->add_option("--scenario", options->scenario,
+                   "hover, diagonal, ladder, circle, waypoints, training, identification, a file, or all "
+                   "(the thesis's "
+                   "programme)")
+      ->capture_default_str();
+  verb->add_option("--controllers", options->controllers, "Names with commas between; all of them otherwise")
+      ->delimiter(',');
+  verb->add_option("--runs", options->runs, "Flights of each")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  verb->add_option("--seed", options->seed, "Of all that is random")->capture_default_str();
+  verb->add_option("--workers", options->workers,
+                   "Threads; 0 is one per core. The results do not depend on it")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  verb->add_option("--position", options->position, "lidar (scans, matcher, filter) or given (exact)")
+      ->capture_default_str();
+  verb->add_option("--lidar-sigma-mm", options->lidar_sigma_mm, "Range noise of the LIDAR")
+      ->check(CLI::Range(0.0, 500.0))
+      ->capture_default_str();
+  verb->add_option("--gains", options->gains, "File of gains; the frozen ones otherwise");
+  verb->add_option("--json", options->json, "Write the comparison to this file");
+  verb->add_option("--out", options->out, "Folder for logs, residual tables and pictures");
+  verb->add_option("--tune", options->tune, "Tune the controllers and write their gains to this file");
+  verb->add_option("--budget", options->budget, "With --tune: evaluations per controller")
+      ->check(CLI::Range(10, 100000))
+      ->capture_default_str();
+  verb->add_option("--payload-kg", options->hidden.payload_kg,
+                   "Undeclared: mass that no controller knows of");
+  verb->add_option("--map-scale", options->hidden.map_scale,
+                   "Undeclared: the field is so many times the map");
+  verb->add_option("--wind-m-s", options->hidden.wind_m_s, "Undeclared: steady wind along the tunnel");
+  verb->add_option("--gust-m-s", options->hidden.gust_m_s,
+                   "Undeclared: gusts along the tunnel, standard deviation");
+  verb->add_option("--motor-loss", options->hidden.motor_loss,
+                   "Undeclared: share of its thrust that a rotor lost");
+  verb->add_option("--weak-rotor", options->hidden.weak_rotor, "Which rotor that is, 1 to 4");
+  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+}
+
+}  // namespace tunnelrig::cli

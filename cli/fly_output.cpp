@@ -1,0 +1,174 @@
+#include "cli/fly_output.h"
+
+#include "cli/console.h"
+#include "cli/fly_pictures.h"
+#include "datasets/csv.h"
+
+#include <cmath>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig::cli {
+namespace {
+
+constexpr double kMm = 1e3;
+
+std::string contacts_text(const Comparison& c) {
+  if (c.contacts == 0) return "0";
+  const ContactEvent* first = nullptr;
+  for (const RunResult& run : c.runs) {
+    if (!run.touched.empty() && (first == nullptr || run.touched[0].time_s < first->time_s))
+      first = &run.touched[0];
+  }
+  return fmt::format("{} in {} runs, first at {:.2f} s, ({:.0f}, {:.0f}) mm", c.contacts, c.runs_with_contact,
+                     first->time_s, kMm * first->y_m, kMm * first->z_m);
+}
+
+double rounded(double value) { return std::round(value * 1e4) / 1e4; }
+
+nlohmann::ordered_json controller_json(const Comparison& c) {
+  nlohmann::ordered_json json{{"name", c.controller},
+                              {"runs", c.runs.size()},
+                              {"rms_y_mm", rounded(kMm * c.rms_y_m)},
+                              {"rms_z_mm", rounded(kMm * c.rms_z_m)},
+                              {"max_y_mm", rounded(kMm * c.largest_y_m)},
+                              {"max_z_mm", rounded(kMm * c.largest_z_m)},
+                              {"ci95_rms_mm", {rounded(kMm * c.ci95_low_m), rounded(kMm * c.ci95_high_m)}},
+                              {"contacts", c.contacts},
+                              {"first_contact_s", nullptr},
+                              {"estimator_rms_mm", rounded(kMm * c.estimator_rms_m)},
+                              {"thrust_saturated_s", rounded(c.saturated_s)}};
+  if (c.first_contact_s) json["first_contact_s"] = rounded(*c.first_contact_s);
+  return json;
+}
+
+nlohmann::ordered_json scenario_json(const FlownScenario& flown, const std::string& map, std::uint64_t seed) {
+  nlohmann::ordered_json json{{"format", "tunnelrig-fly/1"},
+                              {"tunnel", flown.tunnel},
+                              {"scenario", flown.scenario},
+                              {"map", map},
+                              {"seed", seed},
+                              {"controllers", nlohmann::ordered_json::array()}};
+  for (const Comparison& c : flown.controllers) json["controllers"].push_back(controller_json(c));
+  return json;
+}
+
+struct Printed {
+  const char *tunnel, *scenario, *controller, *result;
+};
+
+/// 6.3 of the thesis, by the controller of ours that is its.
+constexpr Printed kPrinted[] = {
+    {"2.4", "hover", "ibs", "within ±60 mm"},
+    {"2.4", "hover", "pid-single", "within ±60 mm"},
+    {"2.4", "diagonal", "ibs", "z ±50 mm; y 75 mm at first, then ±50 mm"},
+    {"2.4", "ladder", "ibs", "y ±60 mm; z slightly better than PID"},
+    {"2.4", "ladder", "pid-single", "y ±60 mm"},
+    {"2.4", "circle", "ibs", "±50 mm on both axes"},
+    {"2.4", "circle", "pid-single", "z about ±200 mm, oval path"},
+    {"1.5", "circle", "ibs", "y ±50 mm; a z offset that decays"},
+    {"1.5", "circle", "pid-single", "touches the wall at 1 s and 5.1 s near (370, 460) mm"},
+    {"railway", "waypoints", "ibs", "flown; no error printed"},
+};
+
+std::string comparison_csv(const FlownScenario& flown) {
+  std::string text =
+      "controller,runs,rms_y_mm,rms_z_mm,max_y_mm,max_z_mm,p95_y_mm,p95_z_mm,ci95_low_mm,ci95_high_mm,"
+      "contacts,"
+      "runs_with_contact,lost,effort_N,thrust_saturated_s,outside_map_s,estimator_rms_mm,nees,rejected_"
+      "share\n";
+  for (const Comparison& c : flown.controllers) {
+    fmt::format_to(
+        std::back_inserter(text),
+        "{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{},{:.5f},{:.4f},{:.4f},{:.4f},"
+        "{:.4f},{:.5f}\n",
+        c.controller, c.runs.size(), kMm * c.rms_y_m, kMm * c.rms_z_m, kMm * c.largest_y_m,
+        kMm * c.largest_z_m, kMm * c.p95_y_m, kMm * c.p95_z_m, kMm * c.ci95_low_m, kMm * c.ci95_high_m,
+        c.contacts, c.runs_with_contact, c.lost, c.effort_N, c.saturated_s, c.clamped_s,
+        kMm * c.estimator_rms_m, c.nees, c.rejected_share);
+  }
+  return text;
+}
+
+}  // namespace
+
+void print_flown(const FlownScenario& flown) {
+  fmt::print("{} in the {} tunnel, {} runs\n", flown.scenario, flown.tunnel,
+             flown.controllers.empty() ? 0 : flown.controllers[0].runs.size());
+  Table table({"controller", "rms y [mm]", "rms z [mm]", "max y [mm]", "max z [mm]", "p95 y [mm]",
+               "p95 z [mm]", "mean rms, 95 % [mm]", "effort [N]", "saturated [s]", "estimator [mm]", "NEES/4",
+               "contacts"});
+  for (const Comparison& c : flown.controllers) {
+    const auto mm = [](double m) { return fmt::format("{:.1f}", kMm * m); };
+    table.add(
+        {c.controller, mm(c.rms_y_m), mm(c.rms_z_m), mm(c.largest_y_m), mm(c.largest_z_m), mm(c.p95_y_m),
+         mm(c.p95_z_m), fmt::format("{:.1f} to {:.1f}", kMm * c.ci95_low_m, kMm * c.ci95_high_m),
+         fmt::format("{:.2f}", c.effort_N), fmt::format("{:.2f}", c.saturated_s),
+         fmt::format("{:.1f}", kMm * c.estimator_rms_m), c.nees > 0 ? fmt::format("{:.2f}", c.nees / 4) : "-",
+         contacts_text(c) + (c.lost > 0 ? fmt::format("; {} lost", c.lost) : "")});
+  }
+  table.print();
+  double outside_s = 0;
+  for (const Comparison& c : flown.controllers) outside_s = std::max(outside_s, c.clamped_s);
+  if (outside_s > 0)
+    fmt::print("Up to {:.2f} s of a run were outside the map, where its border's values hold.\n", outside_s);
+  fmt::print("\n");
+}
+
+std::string flown_json(const std::vector<FlownScenario>& flown, const std::string& map, std::uint64_t seed,
+                       bool programme) {
+  if (!programme) return scenario_json(flown[0], map, seed).dump(1) + "\n";
+  nlohmann::ordered_json json{{"format", "tunnelrig-fly-programme/1"},
+                              {"scenarios", nlohmann::ordered_json::array()}};
+  for (const FlownScenario& one : flown) json["scenarios"].push_back(scenario_json(one, map, seed));
+  return json.dump(1) + "\n";
+}
+
+void print_beside_thesis(const std::vector<FlownScenario>& flown) {
+  Table table({"tunnel", "scenario", "controller", "thesis (flown)", "here (simulated): max y, z [mm]",
+               "rms y, z [mm]", "contacts"});
+  for (const Printed& printed : kPrinted) {
+    for (const FlownScenario& one : flown) {
+      if (one.tunnel != printed.tunnel || one.scenario != printed.scenario) continue;
+      for (const Comparison& c : one.controllers) {
+        if (c.controller != printed.controller) continue;
+        table.add({one.tunnel, one.scenario, c.controller, printed.result,
+                   fmt::format("{:.0f}, {:.0f}", kMm * c.largest_y_m, kMm * c.largest_z_m),
+                   fmt::format("{:.0f}, {:.0f}", kMm * c.rms_y_m, kMm * c.rms_z_m), contacts_text(c)});
+      }
+    }
+  }
+  table.print();
+  fmt::print(
+      "Circles are judged after the first turn, contacts always. docs/flight.md says where and why we "
+      "differ.\n");
+}
+
+std::vector<std::filesystem::path> write_flown(const std::filesystem::path& folder,
+                                               const FlownScenario& flown, const FlightTask& task,
+                                               std::string& warning) {
+  std::filesystem::create_directories(folder);
+  std::vector<std::filesystem::path> files;
+  const auto write = [&](const std::string& name, const std::string& text) {
+    files.push_back(folder / name);
+    write_text(files.back(), text);
+  };
+  write("comparison.csv", comparison_csv(flown));
+  for (std::size_t i = 0; i < flown.logs.size(); ++i) {
+    const std::string& name = flown.controllers[i].controller;
+    write(name + ".csv", format_log(flown.logs[i]));
+    write(name + "-residual.csv", format_residuals(flown.identification[i], task.believed));
+  }
+  for (const char* response : {"vertical", "lateral", "roll", "pitch"}) {
+    write(fmt::format("residual-{}.toml", response), residual_schema(response));
+    write(fmt::format("effects-{}.toml", response), residual_effects(response, task.believed));
+  }
+  if (!flown.logs.empty()) {
+    for (auto& file : draw_flown(folder, flown, task, warning)) files.push_back(std::move(file));
+  }
+  return files;
+}
+
+}  // namespace tunnelrig::cli

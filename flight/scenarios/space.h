@@ -1,0 +1,36 @@
+// The tunnel in the flight frame (origin at the middle of the lower edge), as vehicle and scenarios meet it.
+#pragma once
+
+#include "analysis/maps/disturbance_map.h"
+#include "flight/scenarios/trajectory.h"
+#include "flight/tunnel/tunnel.h"
+#include "flight/vehicle/contact.h"
+#include "flight/vehicle/section_scale.h"
+
+#include <string>
+
+namespace tunnelrig {
+
+struct FlightSpace {
+  Tunnel tunnel;
+  Walls walls;
+  double floor_m = 0;  // of the lower edge in the cross-section's own frame; z_flight = z_section − floor_m
+
+  /// Throws InputError where the vehicle is as wide as the tunnel or wider, or as high.
+  FlightSpace(Tunnel shape, const Airframe& frame);
+
+  /// (4.1), (4.2) for this tunnel's bounding box.
+  SectionScale scale(const Airframe& frame) const;
+
+  /// Middle of the bounding box.
+  Plane middle_m() const { return {middle_y_m_, -floor_m + middle_z_m_}; }
+
+ private:
+  double middle_y_m_, middle_z_m_;
+};
+
+/// What differs, in words, where a map was made in another tunnel or with another vehicle by more than one
+/// per cent; empty where it fits. Such a map is flown in normalised coordinates, as an extrapolation.
+std::string extrapolation(const MapGeometry& map, const FlightSpace& space, const Airframe& frame);
+
+}  // namespace tunnelrig

@@ -1,0 +1,68 @@
+// The estimator in the loop: simulated LIDAR → scan matcher → Kalman filter, with the sweep's duration and
+// the matcher's latency.
+#pragma once
+
+#include "flight/lidar/simulated_lidar.h"
+#include "flight/localisation/kalman_filter.h"
+#include "flight/localisation/scan_matcher.h"
+#include "flight/scenarios/space.h"
+#include "flight/simulation/flight.h"
+
+#include <array>
+#include <optional>
+
+namespace tunnelrig {
+
+struct LocalisationSettings {
+  LidarSettings lidar;
+  int cycles_per_scan = 10;   // 40 Hz
+  int cycles_of_latency = 4;  // from the sweep's end to the correction: transfer and matching, 10 ms; assumed
+  /// Not the accelerometer's noise alone: the attitude's error leaves an acceleration of g times it, which
+  /// the filter must be allowed to correct.
+  KinematicModel model = {.acceleration_variance_m2_s4 = 0.45};
+  GateSettings gate;
+  double attitude_sigma_rad =
+      0.0035;  // turns the scan, which moves the match by it times the distance from the centre
+};
+
+/// Positions in the flight frame (z above the floor). `space` must outlive it.
+class Localisation {
+ public:
+  Localisation(const FlightSpace& space, const LocalisationSettings& settings);
+
+  /// For the next flight; what is random in it follows from seed and stream alone.
+  void prepare(std::uint64_t seed, std::uint64_t stream);
+
+  void start(const RigidState& truth);
+  PlanarEstimate step(const EstimatorInput& in);
+  void finish(FlightScore& score) const;
+
+ private:
+  static constexpr std::size_t kRemembered = 16;  // cycles of poses, longer than a sweep
+
+  struct Moment {
+    LidarPose pose;     // true
+    Attitude measured;  // as the autopilot has it
+  };
+
+  void take_scan();
+  void correct();
+  void judge(const RigidState& truth);
+
+  double floor_m_;
+  LocalisationSettings settings_;
+  const CrossSection* section_;
+  ScanMatcher matcher_;
+  std::optional<SimulatedLidar> lidar_;
+  std::optional<KalmanFilter> filter_;
+  Scan scan_;
+  Attitude scan_attitude_;
+  std::array<Moment, kRemembered> moments_;
+  long cycle_ = 0;
+  bool waiting_ = false;
+  int matches_ = 0, rejected_ = 0;
+  double nees_sum_ = 0;
+  long nees_count_ = 0;
+};
+
+}  // namespace tunnelrig

@@ -1,0 +1,196 @@
+#include "flight/vehicle/disturbance_field.h"
+
+#include "datasets/published_field.h"
+#include "datasets/thesis.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunnelrig {
+namespace {
+
+constexpr std::size_t kBuckets = 64;
+
+/// Slopes of the natural cubic spline through (x, f): its tridiagonal system in the first derivatives.
+std::vector<double> spline_slopes(const std::vector<double>& x, const std::vector<double>& f) {
+  const std::size_t n = x.size();
+  std::vector<double> diagonal(n), above(n), right(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double before = i > 0 ? 1 / (x[i] - x[i - 1]) : 0, after = i + 1 < n ? 1 / (x[i + 1] - x[i]) : 0;
+    diagonal[i] = 2 * (before + after);
+    above[i] = after;
+    right[i] = 3 * ((i > 0 ? (f[i] - f[i - 1]) * before * before : 0) +
+                    (i + 1 < n ? (f[i + 1] - f[i]) * after * after : 0));
+  }
+  for (std::size_t i = 1; i < n; ++i) {
+    const double factor = above[i - 1] / diagonal[i - 1];
+    diagonal[i] -= factor * above[i - 1];
+    right[i] -= factor * right[i - 1];
+  }
+  std::vector<double> slope(n);
+  for (std::size_t i = n; i-- > 0;) {
+    slope[i] = (right[i] - (i + 1 < n ? above[i] * slope[i + 1] : 0)) / diagonal[i];
+  }
+  return slope;
+}
+
+/// A table over the mirrored columns and the rows; derivatives along either axis keep its shape.
+struct Layer {
+  std::vector<double> y, z, value;
+
+  std::vector<double> along_y(const std::vector<double>& f) const {
+    std::vector<double> result(f.size()), line(y.size());
+    for (std::size_t row = 0; row < z.size(); ++row) {
+      std::copy_n(f.begin() + static_cast<std::ptrdiff_t>(row * y.size()), y.size(), line.begin());
+      const auto slope = spline_slopes(y, line);
+      std::copy(slope.begin(), slope.end(), result.begin() + static_cast<std::ptrdiff_t>(row * y.size()));
+    }
+    return result;
+  }
+
+  std::vector<double> along_z(const std::vector<double>& f) const {
+    std::vector<double> result(f.size()), line(z.size());
+    for (std::size_t column = 0; column < y.size(); ++column) {
+      for (std::size_t row = 0; row < z.size(); ++row) line[row] = f[row * y.size() + column];
+      const auto slope = spline_slopes(z, line);
+      for (std::size_t row = 0; row < z.size(); ++row) result[row * y.size() + column] = slope[row];
+    }
+    return result;
+  }
+};
+
+/// The map's right half with its mirror image; `sign` is −1 for an odd layer.
+Layer mirrored(const MapGrid& grid, const std::vector<double>& right_value, double sign) {
+  Layer layer{{}, grid.z_norm, {}};
+  std::vector<std::size_t> columns;
+  for (std::size_t c = 0; c < grid.y_norm.size(); ++c) {
+    if (grid.y_norm[c] >= 0) columns.push_back(c);
+  }
+  for (std::size_t i = columns.size(); i-- > 1;) layer.y.push_back(-grid.y_norm[columns[i]]);
+  for (const std::size_t c : columns) layer.y.push_back(grid.y_norm[c]);
+  for (std::size_t row = 0; row < grid.z_norm.size(); ++row) {
+    const auto value = [&](std::size_t i) { return right_value[grid.index(row, columns[i])]; };
+    for (std::size_t i = columns.size(); i-- > 1;) layer.value.push_back(sign * value(i));
+    layer.value.push_back(sign < 0 ? 0 : value(0));
+    for (std::size_t i = 1; i < columns.size(); ++i) layer.value.push_back(value(i));
+  }
+  return layer;
+}
+
+/// For every bucket of [low, 1] the cell that its lower end lies in.
+std::vector<std::size_t> buckets(const std::vector<double>& x, double low) {
+  std::vector<std::size_t> at(kBuckets);
+  for (std::size_t b = 0; b < kBuckets; ++b) {
+    const double end = low + (1 - low) * static_cast<double>(b) / kBuckets;
+    while (at[b] + 2 < x.size() && x[at[b] + 1] <= end) ++at[b];
+  }
+  return at;
+}
+
+/// The cell of a value that lies on the axis.
+std::size_t cell_of(double value, double low, const std::vector<double>& x,
+                    const std::vector<std::size_t>& at) {
+  const auto bucket = static_cast<std::size_t>((value - low) / (1 - low) * kBuckets);
+  std::size_t cell = at[std::min(bucket, kBuckets - 1)];
+  while (cell + 2 < x.size() && x[cell + 1] <= value) ++cell;
+  return cell;
+}
+
+/// Hermite's cubic basis on a cell of this width: weights of value and slope at its lower and upper end.
+struct Basis {
+  double low, low_slope, high, high_slope;
+
+  Basis(double t, double width) {
+    const double t2 = t * t, t3 = t2 * t;
+    high = 3 * t2 - 2 * t3;
+    low = 1 - high;
+    low_slope = (t3 - 2 * t2 + t) * width;
+    high_slope = (t3 - t2) * width;
+  }
+};
+
+}  // namespace
+
+DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, double thrust_error,
+                                   double uneven_error) {
+  const double coverage = map.coverage_factor > 0 ? map.coverage_factor : 2;
+  const auto fractions = [&](const MapLayer& layer, double error) {
+    std::vector<double> f(layer.value_percent.size());
+    for (std::size_t i = 0; i < f.size(); ++i) {
+      f[i] = 0.01 * (scale * layer.value_percent[i] + error * layer.u95_percent[i] / coverage);
+    }
+    return f;
+  };
+  const std::array<Layer, 2> layers = {mirrored(map.grid, fractions(map.delta_ct, thrust_error), 1),
+                                       mirrored(map.grid, fractions(map.uneven_thrust, uneven_error), -1)};
+  const std::size_t columns = layers[0].y.size(), first = columns / 2;
+  y_.assign(layers[0].y.begin() + static_cast<std::ptrdiff_t>(first), layers[0].y.end());
+  z_ = layers[0].z;
+  y_at_ = buckets(y_, 0);
+  z_at_ = buckets(z_, -1);
+  for (std::size_t i = 1; i < y_.size(); ++i) per_width_.push_back(1 / (y_[i] - y_[i - 1]));
+  for (std::size_t i = 1; i < z_.size(); ++i) per_height_.push_back(1 / (z_[i] - z_[i - 1]));
+  nodes_.resize(y_.size() * z_.size());
+  for (std::size_t k = 0; k < layers.size(); ++k) {
+    const auto f_y = layers[k].along_y(layers[k].value), f_z = layers[k].along_z(layers[k].value);
+    const auto f_yz = layers[k].along_z(f_y);
+    for (std::size_t row = 0; row < z_.size(); ++row) {
+      for (std::size_t c = 0; c < y_.size(); ++c) {
+        Node& node = nodes_[row * y_.size() + c];
+        const std::size_t i = row * columns + first + c;
+        node.f[k] = layers[k].value[i];
+        node.f_y[k] = f_y[i];
+        node.f_z[k] = f_z[i];
+        node.f_yz[k] = f_yz[i];
+      }
+    }
+  }
+}
+
+Disturbance DisturbanceField::at(double y_norm, double z_norm) const {
+  if (nodes_.empty()) return {};
+  const double y = std::min(std::abs(y_norm), 1.0), z = std::clamp(z_norm, -1.0, 1.0);
+  const std::size_t c = cell_of(y, 0, y_, y_at_), r = cell_of(z, -1, z_, z_at_);
+  const double width = y_[c + 1] - y_[c], height = z_[r + 1] - z_[r];
+  const Basis by((y - y_[c]) * per_width_[c], width), bz((z - z_[r]) * per_height_[r], height);
+  const Node* low = &nodes_[r * y_.size() + c];
+  const Node* high = low + y_.size();
+  double value[2];
+  for (std::size_t k = 0; k < 2; ++k) {
+    const auto across = [&](const Node* row) {
+      return by.low * row[0].f[k] + by.low_slope * row[0].f_y[k] + by.high * row[1].f[k] +
+             by.high_slope * row[1].f_y[k];
+    };
+    const auto across_slope = [&](const Node* row) {
+      return by.low * row[0].f_z[k] + by.low_slope * row[0].f_yz[k] + by.high * row[1].f_z[k] +
+             by.high_slope * row[1].f_yz[k];
+    };
+    value[k] = bz.low * across(low) + bz.low_slope * across_slope(low) + bz.high * across(high) +
+               bz.high_slope * across_slope(high);
+  }
+  return {value[0], y_norm < 0 ? -value[1] : value[1]};
+}
+
+DisturbanceMap published_disturbance_map() {
+  DisturbanceMap map;
+  map.geometry = {0.7434, 0.3, 1.5, 1.5, 0.1524};
+  for (int i = -20; i <= 20; ++i) {
+    map.grid.y_norm.push_back(i / 20.0);
+    map.grid.z_norm.push_back(i / 20.0);
+  }
+  for (const double z : map.grid.z_norm) {
+    for (const double y : map.grid.y_norm) {
+      map.delta_ct.value_percent.push_back(100 * published_thrust_change(y, z));
+      map.uneven_thrust.value_percent.push_back(100 * published_uneven_thrust(y, z));
+    }
+  }
+  map.delta_ct.u95_percent.assign(map.grid.nodes(), 0);
+  map.uneven_thrust.u95_percent.assign(map.grid.nodes(), 0);
+  map.method = "published";
+  map.coverage_factor = 2;
+  map.c_t_origin = thesis::kCtTunnelOrigin;
+  map.c_t_open_space = thesis::kCtOpenSpace;
+  return map;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,56 @@
+// The map as flight feels it: a smooth field over normalised coordinates.
+#pragma once
+
+#include "analysis/maps/disturbance_map.h"
+
+#include <string>
+#include <vector>
+
+namespace tunnelrig {
+
+/// What the walls do to the rotors at one place, at constant speed.
+struct Disturbance {
+  double thrust_change = 0;  // ΔC_T as a fraction
+  double uneven = 0;         // U (5.1) as a fraction; negative rolls to the right
+
+  /// Thrust of a right and a left rotor over that at OT.
+  double right_factor() const { return (1 + thrust_change) * (1 + uneven); }
+  double left_factor() const { return (1 + thrust_change) * (1 - uneven); }
+};
+
+/// Bicubic spline through the map's nodes (de Boor 1962), twice continuously differentiable. It is built from
+/// the right half and mirrored, so that ΔC_T is even and U odd in ȳ to the last bit. Outside [−1, 1]² the
+/// value at the nearest point of the border.
+class DisturbanceField {
+ public:
+  /// No disturbance anywhere.
+  DisturbanceField() = default;
+
+  /// `scale` multiplies both layers; the errors are in units of each layer's standard uncertainty, shared by
+  /// all nodes of it.
+  explicit DisturbanceField(const DisturbanceMap& map, double scale = 1, double thrust_error = 0,
+                            double uneven_error = 0);
+
+  Disturbance at(double y_norm, double z_norm) const;
+
+  /// Whether a place is outside the map.
+  static bool outside(double y_norm, double z_norm) {
+    return !(y_norm >= -1 && y_norm <= 1 && z_norm >= -1 && z_norm <= 1);
+  }
+
+ private:
+  struct alignas(64) Node {
+    double f[2]{}, f_y[2]{}, f_z[2]{}, f_yz[2]{};  // ΔC_T and U, fractions
+  };
+
+  std::vector<double> y_, z_;                   // y_ from 0 to 1
+  std::vector<double> per_width_, per_height_;  // of every cell
+  std::vector<std::size_t> y_at_, z_at_;        // buckets: where to begin the search for a cell
+  std::vector<Node> nodes_;                     // row by row, rows follow z
+};
+
+/// The field that datasets/published_field.h invents within the thesis's claims, for the rig's geometry, on
+/// 41 × 41 nodes, with no uncertainty: what flies where no measured map is given.
+DisturbanceMap published_disturbance_map();
+
+}  // namespace tunnelrig

@@ -1,0 +1,176 @@
+// `tunnelrig fly` through the command line: its JSON, its files, what it refuses.
+#include "cli/program.h"
+#include "datasets/csv.h"
+#include "support/temporary_folder.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig {
+namespace {
+
+using nlohmann::json;
+using test::ProgramResult;
+using testing::HasSubstr;
+
+/// Two seconds of a small circle, so that a flight takes milliseconds.
+constexpr const char* kShort =
+    "format = \"tunnelrig-scenario/1\"\nname = \"short\"\n[[segments]]\nkind = \"circle\"\n"
+    "centre = [0, 0.65]\nradius_m = 0.1\nrate_rad_s = 1.5\nturns = 0.5\n";
+
+struct Fly : testing::Test {
+  test::TemporaryFolder folder;
+
+  Fly() { write_text(folder / "short.toml", kShort); }
+
+  ProgramResult run(const std::string& arguments) const {
+    return test::run_program(folder.path(), "fly " + arguments);
+  }
+
+  json flown(const std::string& arguments) const {
+    const ProgramResult result = run(arguments + " --json f.json");
+    EXPECT_EQ(result.code, 0) << arguments << "\n" << result.error;
+    return json::parse(read_text(folder / "f.json"));
+  }
+
+  std::string refusal(const std::string& arguments) const {
+    const ProgramResult result = run(arguments + " --runs 1 --json no.json --out no");
+    EXPECT_EQ(result.code, 2) << arguments;
+    EXPECT_EQ(result.out, "") << arguments;
+    EXPECT_FALSE(std::filesystem::exists(folder / "no.json")) << arguments;
+    EXPECT_FALSE(std::filesystem::exists(folder / "no")) << arguments;
+    return result.error;
+  }
+};
+
+/// The names and types of docs/flight.md, in its order.
+void expect_contract(const json& object) {
+  EXPECT_EQ(object["format"], "tunnelrig-fly/1");
+  for (const char* text : {"tunnel", "scenario", "map"}) EXPECT_TRUE(object.at(text).is_string()) << text;
+  EXPECT_TRUE(object.at("seed").is_number_unsigned());
+  EXPECT_EQ(object.size(), 6U);
+  ASSERT_FALSE(object.at("controllers").empty());
+  for (const json& one : object["controllers"]) {
+    EXPECT_EQ(one.size(), 11U);
+    EXPECT_TRUE(one.at("name").is_string());
+    for (const char* count : {"runs", "contacts"}) EXPECT_TRUE(one.at(count).is_number_integer()) << count;
+    for (const char* number :
+         {"rms_y_mm", "rms_z_mm", "max_y_mm", "max_z_mm", "estimator_rms_mm", "thrust_saturated_s"}) {
+      EXPECT_TRUE(one.at(number).is_number()) << number;
+      EXPECT_TRUE(std::isfinite(one.at(number).get<double>())) << number;
+    }
+    EXPECT_GE(one["max_y_mm"], one["rms_y_mm"]);
+    ASSERT_EQ(one.at("ci95_rms_mm").size(), 2U);
+    EXPECT_LE(one["ci95_rms_mm"][0], one["ci95_rms_mm"][1]);
+    EXPECT_EQ(one.at("first_contact_s").is_null(), one["contacts"] == 0);
+  }
+}
+
+TEST_F(Fly, HelpShowsExamplesAndEveryOption) {
+  const ProgramResult help = run("--help");
+  EXPECT_EQ(help.code, 0);
+  for (const char* part : {"Examples: tunnelrig fly", "--map", "--tunnel", "--scenario", "--controllers",
+                           "--runs", "--seed", "--json", "--out"})
+    EXPECT_THAT(help.out, HasSubstr(part));
+}
+
+TEST_F(Fly, JsonIsTheContract) {
+  const json object = flown("--scenario short.toml --controllers ibs,ibs-map --runs 3 --seed 9");
+  expect_contract(object);
+  EXPECT_EQ(object["seed"], 9);
+  EXPECT_EQ(object["tunnel"], "1.5");
+  EXPECT_EQ(object["scenario"], "short");
+  EXPECT_EQ(object["controllers"].size(), 2U);
+  EXPECT_EQ(object["controllers"][1]["name"], "ibs-map");
+  EXPECT_EQ(object["controllers"][0]["runs"], 3);
+}
+
+TEST_F(Fly, IsTheSameToTheByteForASeedWhateverTheNumberOfThreads) {
+  std::string first;
+  for (const char* workers : {"1", "2", "5"}) {
+    const std::string options =
+        "--scenario short.toml --controllers ibs-do,indi --runs 5 --seed 3 --workers ";
+    const ProgramResult result = run(options + workers + " --json f.json");
+    ASSERT_EQ(result.code, 0) << result.error;
+    const std::string all = result.out + read_text(folder / "f.json");
+    if (first.empty()) first = all;
+    EXPECT_EQ(all, first) << workers;
+  }
+  EXPECT_NE(flown("--scenario short.toml --controllers indi --runs 2 --seed 3"),
+            flown("--scenario short.toml --controllers indi --runs 2 --seed 4"));
+}
+
+TEST_F(Fly, TheWholeProgrammeStandsBesideTheThesis) {
+  const ProgramResult result =
+      run("--scenario all --runs 1 --controllers ibs,pid-single --position given --json f.json");
+  ASSERT_EQ(result.code, 0) << result.error;
+  EXPECT_THAT(result.out, HasSubstr("thesis (flown)"));
+  EXPECT_THAT(result.out, HasSubstr("touches the wall at 1 s and 5.1 s near (370, 460) mm"));
+  const json programme = json::parse(read_text(folder / "f.json"));
+  EXPECT_EQ(programme["format"], "tunnelrig-fly-programme/1");
+  ASSERT_EQ(programme["scenarios"].size(), 6U);
+  for (const json& one : programme["scenarios"]) expect_contract(one);
+}
+
+TEST_F(Fly, OutHoldsLogsTablesAndPictures) {
+  ASSERT_EQ(run("--scenario short.toml --controllers ibs --runs 2 --out flights").code, 0);
+  for (const char* file : {"ibs-residual.csv", "residual-roll.toml", "effects-roll.toml"})
+    EXPECT_TRUE(std::filesystem::exists(folder / "flights" / file)) << file;
+  const Sheet log = read_csv(folder / "flights/ibs.csv");
+  EXPECT_GT(log.rows.size(), 50U);
+  EXPECT_EQ(read_csv(folder / "flights/comparison.csv").rows.size(), 1U);
+  for (const char* file : {"path.svg", "path.png", "error-y.svg", "error-z.png"})
+    EXPECT_GT(std::filesystem::file_size(folder / "flights" / file), 500U) << file;
+}
+
+TEST_F(Fly, AScenarioFlownInTheTunnelThatItAsksFor) {
+  std::string text = kShort;
+  text.insert(text.find("[["), "tunnel = \"2.4\"\n");
+  write_text(folder / "large.toml", text);
+  EXPECT_EQ(flown("--scenario large.toml --controllers ibs --runs 1")["tunnel"], "2.4");
+  EXPECT_EQ(flown("--scenario large.toml --tunnel 1.5 --controllers ibs --runs 1")["tunnel"], "1.5");
+  EXPECT_THAT(run("--scenario large.toml --controllers ibs --runs 1").error, HasSubstr("extrapolated"));
+}
+
+TEST_F(Fly, WhatIsNoMapIsRefused) {
+  EXPECT_THAT(refusal("--map none.json"), HasSubstr("none.json"));
+  write_text(folder / "m.json", "{\"format\": \"something/1\"}");
+  EXPECT_THAT(refusal("--map m.json"), HasSubstr("m.json"));
+  write_text(folder / "m.json", "y,z\n1,2\n");
+  EXPECT_THAT(refusal("--map m.json"), HasSubstr("m.json"));
+}
+
+TEST_F(Fly, ImpossibleScenariosAreRefused) {
+  const auto scenario = [&](const std::string& centre) {
+    std::string text = kShort;
+    text.replace(text.find("[0, 0.65]"), 9, centre);
+    write_text(folder / "s.toml", text);
+    return refusal("--scenario s.toml");
+  };
+  EXPECT_THAT(scenario("[0.3, 0.65]"), HasSubstr("leaves the tunnel at y ="));
+  EXPECT_THAT(scenario("[0.45, 0.65]"), HasSubstr("starts inside a wall at y = 0.450 m"));
+  EXPECT_THAT(scenario("[0, nan]"), HasSubstr("s.toml:5"));
+  EXPECT_THAT(refusal("--scenario nowhere"), HasSubstr("no scenario nowhere"));
+  EXPECT_THAT(refusal("--scenario all --tunnel 1.5"), HasSubstr("--tunnel does not go with it"));
+}
+
+TEST_F(Fly, ATunnelThatTheVehicleDoesNotFitIsRefused) {
+  write_text(folder / "narrow.toml", "name = \"narrow\"\nshape = \"square\"\nwidth_m = 0.7\nlength_m = 5\n");
+  EXPECT_THAT(refusal("--tunnel narrow.toml --scenario hover"), HasSubstr("0.7"));
+  EXPECT_THAT(refusal("--tunnel nowhere"), HasSubstr("nowhere"));
+}
+
+TEST_F(Fly, OtherBadOptionsAreRefused) {
+  EXPECT_THAT(refusal("--controllers lqr"), HasSubstr("no controller is called 'lqr'; there are ibs,"));
+  EXPECT_THAT(refusal("--position guessed"), HasSubstr("must be lidar or given"));
+  EXPECT_THAT(refusal("--motor-loss 0.9"), HasSubstr("motor_loss"));
+  EXPECT_THAT(refusal("--payload-kg nan"), HasSubstr("payload_kg"));
+  write_text(folder / "g.toml", "format = \"tunnelrig-gains/1\"\n[ibs]\nk1_y = -3\n");
+  EXPECT_THAT(refusal("--gains g.toml"), HasSubstr("g.toml:3: ibs.k1_y must be a number from"));
+}
+
+}  // namespace
+}  // namespace tunnelrig

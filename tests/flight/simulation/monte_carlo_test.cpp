@@ -1,0 +1,96 @@
+#include "flight/simulation/monte_carlo.h"
+
+#include "datasets/error.h"
+#include "flight/tuning/cma_es.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+struct MonteCarlo : testing::Test {
+  Airframe frame;
+  FlightSpace space{tunnel_from("1.5"), frame};
+  DisturbanceMap map = published_disturbance_map();
+  Scenario hover = scenario_from("hover", space, frame);
+
+  MonteCarlo() {
+    hover.trajectory = {};
+    hover.trajectory.hold(space.middle_m(), 3);
+  }
+
+  FlightTask task(int runs, int workers) const {
+    return {.space = &space,
+            .scenario = &hover,
+            .map = &map,
+            .believed = frame,
+            .runs = runs,
+            .workers = workers,
+            .seed = 5};
+  }
+};
+
+void expect_same(const Comparison& a, const Comparison& b) {
+  ASSERT_EQ(a.runs.size(), b.runs.size());
+  for (std::size_t i = 0; i < a.runs.size(); ++i) {
+    EXPECT_EQ(a.runs[i].rms_y_m, b.runs[i].rms_y_m);
+    EXPECT_EQ(a.runs[i].largest_z_m, b.runs[i].largest_z_m);
+    EXPECT_EQ(a.runs[i].estimator_rms_m, b.runs[i].estimator_rms_m);
+  }
+  EXPECT_EQ(a.rms_y_m, b.rms_y_m);
+  EXPECT_EQ(a.p95_z_m, b.p95_z_m);
+}
+
+TEST_F(MonteCarlo, IsTheSameToTheBitWhateverTheNumberOfWorkers) {
+  const Comparison one = fly_runs(task(6, 1), "ibs-map", frozen_gains());
+  for (const int workers : {1, 2, 5}) expect_same(one, fly_runs(task(6, workers), "ibs-map", frozen_gains()));
+}
+
+TEST_F(MonteCarlo, RunsDifferAndSoDoSeeds) {
+  FlightTask given = task(4, 2);
+  given.localisation.reset();
+  const Comparison one = fly_runs(given, "ibs", frozen_gains());
+  EXPECT_NE(one.runs[0].rms_y_m, one.runs[1].rms_y_m);
+  given.seed = 6;
+  EXPECT_NE(one.runs[0].rms_y_m, fly_runs(given, "ibs", frozen_gains()).runs[0].rms_y_m);
+}
+
+TEST_F(MonteCarlo, ALoggedRunIsTheOneOfTheSeries) {
+  const Comparison all = fly_runs(task(3, 1), "ibs-do", frozen_gains());
+  FlightScore score;
+  fly_logged(task(3, 1), "ibs-do", frozen_gains(), 2, &score);
+  EXPECT_EQ(score.tracking[0].rms_m(), all.runs[2].rms_y_m);
+}
+
+TEST_F(MonteCarlo, TheEstimatorKeepsItsGoalAt40mmOfRangeNoise) {
+  FlightTask noisy = task(4, 2);
+  noisy.localisation->lidar.range_sigma_m = 0.040;
+  const Comparison result = fly_runs(noisy, "ibs-map", frozen_gains());
+  EXPECT_LT(result.estimator_rms_m, 0.005);
+  EXPECT_EQ(result.contacts, 0);
+}
+
+TEST_F(MonteCarlo, UnknownControllersAndTruthsAreRefused) {
+  EXPECT_THROW(fly_runs(task(2, 2), "lqr", frozen_gains()), InputError);
+  EXPECT_THROW((HiddenTruth{.payload_kg = -1}.validate()), InputError);
+  EXPECT_THROW((HiddenTruth{.wind_m_s = NAN}.validate()), InputError);
+  EXPECT_THROW((HiddenTruth{.weak_rotor = 5}.validate()), InputError);
+  EXPECT_NO_THROW((HiddenTruth{.payload_kg = 0.2, .motor_loss = 0.04}.validate()));
+}
+
+TEST(Search, FindsTheLowestPointOfARotatedValley) {
+  const auto valley = [](const Eigen::VectorXd& x) {
+    const double a = x[0] + x[1] - 1.1, b = x[0] - x[1] - 0.3, c = x[2] - 0.4;
+    return 100 * a * a + b * b + 10 * c * c;
+  };
+  const SearchResult found = minimise(valley, Eigen::VectorXd::Constant(3, 0.5), 0.2, 600, 3);
+  EXPECT_EQ(found.evaluations, 600);
+  EXPECT_LT(found.cost, 1e-6);
+  EXPECT_NEAR(found.best[0], 0.7, 1e-2);
+  EXPECT_NEAR(found.best[2], 0.4, 1e-2);
+}
+
+}  // namespace
+}  // namespace tunnelrig

@@ -1,0 +1,108 @@
+#include "datasets/error.h"
+#include "flight/scenarios/scenario.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using testing::HasSubstr;
+
+struct Scenarios : testing::Test {
+  Airframe frame;
+  FlightSpace space{tunnel_from("1.5"), frame};
+
+  std::string refusal(const std::string& text) {
+    try {
+      check_scenario(parse_scenario("format = \"tunnelrig-scenario/1\"\n" + text, "s.toml"), space, frame);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+};
+
+TEST_F(Scenarios, OfTheThesisFitEveryTunnelOfTheThesis) {
+  for (const char* tunnel : {"1.5", "2.4", "railway"}) {
+    const FlightSpace there(tunnel_from(tunnel), frame);
+    for (const std::string_view name : scenario_names())
+      EXPECT_NO_THROW(scenario_from(std::string(name), there, frame)) << name << " in " << tunnel;
+  }
+}
+
+TEST_F(Scenarios, PathsAreSmoothAndTheirDerivativesTrue) {
+  for (const std::string_view name : scenario_names()) {
+    const Trajectory path = scenario_from(std::string(name), space, frame).trajectory;
+    constexpr double kStep_s = 1e-4;
+    for (double t = 0.05; t < path.duration_s() - 0.05; t += 0.0937) {
+      const PlanarReference now = path.at(t), before = path.at(t - kStep_s), after = path.at(t + kStep_s);
+      for (std::size_t i = 0; i < 2; ++i) {
+        EXPECT_NEAR(now.velocity_m_s[i], (after.position_m[i] - before.position_m[i]) / (2 * kStep_s), 1e-4)
+            << name << t;
+      }
+    }
+  }
+}
+
+TEST_F(Scenarios, TheCirclesAreThosePrinted) {
+  const Scenario circle = scenario_from("circle", space, frame);
+  const double turn_s = 2 * std::numbers::pi / (0.46 * std::numbers::pi);  // (6.32), t in milliseconds
+  EXPECT_NEAR(circle.score_from_s, turn_s, 1e-9);
+  const PlanarReference quarter = circle.trajectory.at(turn_s / 4);
+  EXPECT_NEAR(quarter.position_m[0], 0.3, 1e-9);
+  EXPECT_NEAR(quarter.position_m[1], 0.65, 1e-9);
+  EXPECT_NEAR(quarter.velocity_m_s[1], -0.3 * 0.46 * std::numbers::pi, 1e-9);
+  const FlightSpace large(tunnel_from("2.4"), frame);
+  EXPECT_NEAR(scenario_from("circle", large, frame).score_from_s, 10, 1e-9);
+}
+
+TEST_F(Scenarios, FilesAreRead) {
+  const Scenario scenario = parse_scenario(
+      "format = \"tunnelrig-scenario/1\"\nname = \"up\"\nstart = [0, 0.5]\nscore_from_s = 1\n"
+      "[[segments]]\nkind = \"hold\"\nduration_s = 2\n[[segments]]\nkind = \"move\"\nto = [0, "
+      "0.9]\nacceleration_m_s2 = 0.1\n",
+      "s.toml");
+  EXPECT_EQ(scenario.name, "up");
+  EXPECT_NEAR(scenario.trajectory.duration_s(), 2 + 2 * std::sqrt(0.4 / 0.1), 1e-9);
+  EXPECT_NEAR(scenario.trajectory.at(100).position_m[1], 0.9, 1e-12);
+}
+
+TEST_F(Scenarios, BadOnesAreRefusedWithTheRule) {
+  const std::string hold = "[[segments]]\nkind = \"hold\"\nduration_s = 2\n";
+  EXPECT_EQ(refusal("start = [0, 0.5]\n" + hold), "accepted");
+  EXPECT_THAT(refusal("start = [0, 0.1]\n" + hold),
+              HasSubstr("starts inside a wall at y = 0.000 m, 0.100 m"));
+  EXPECT_THAT(refusal("start = [0, 9]\n" + hold), HasSubstr("starts inside a wall"));
+  EXPECT_THAT(refusal("start = [0, 0.5]\n" + hold +
+                      "[[segments]]\nkind = \"move\"\nto = [0.5, 0.5]\nacceleration_m_s2 = 1\n"),
+              HasSubstr("leaves the tunnel at y = 0.3"));
+  EXPECT_THAT(refusal(hold), HasSubstr("start is missing"));
+  EXPECT_THAT(refusal("start = [0, nan]\n" + hold), HasSubstr("s.toml:2"));
+  EXPECT_THAT(refusal("start = [0, 0.5]\n[[segments]]\nkind = \"jump\"\n"), HasSubstr("kind must be"));
+  EXPECT_THAT(refusal("start = [0, 0.5]\n" + hold +
+                      "[[segments]]\nkind = \"circle\"\ncentre = [0, 0.7]\nradius_m = 0.1\n"
+                      "rate_rad_s = 1\nturns = 1\n"),
+              HasSubstr("the one before ends at"));
+  EXPECT_THAT(refusal("segments = 3\n"), HasSubstr("no [[segments]]"));
+}
+
+TEST_F(Scenarios, AVehicleWiderThanTheTunnelIsRefused) {
+  frame.width_m = 1.6;
+  EXPECT_THROW(FlightSpace(tunnel_from("1.5"), frame), InputError);
+  frame = {};
+  frame.height_m = 1.5;
+  EXPECT_THROW(FlightSpace(tunnel_from("1.5"), frame), InputError);
+}
+
+TEST_F(Scenarios, AMapOfAnotherTunnelIsLabelled) {
+  const MapGeometry map{0.7434, 0.3, 1.5, 1.5, 0.1524};
+  EXPECT_EQ(extrapolation(map, space, frame), "");
+  EXPECT_THAT(extrapolation(map, FlightSpace(tunnel_from("2.4"), frame), frame), HasSubstr("2.35 x 2.39"));
+}
+
+}  // namespace
+}  // namespace tunnelrig
