@@ -8,6 +8,9 @@ target_compile_options(tunnelrig_options INTERFACE
   $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
   # gcc 12 warns of designated initialisers that leave defaulted members out, which is what they are for
   -Wno-missing-field-initializers)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-fpch-preprocess>)  # ccache needs it to see through precompiled headers
+endif()
 if(TUNNELRIG_SANITIZE)
   add_compile_options(-fsanitize=${TUNNELRIG_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${TUNNELRIG_SANITIZE})
@@ -35,4 +38,9 @@ function(tunnelrig_library name)
   add_library(${name} STATIC ${arg_SOURCES})
   target_include_directories(${name} PUBLIC ${seen})
   target_link_libraries(${name} PUBLIC ${arg_DEPENDS} PRIVATE tunnelrig_options ${arg_PRIVATE_LIBRARIES})
+  if("Eigen3::Eigen" IN_LIST arg_DEPENDS OR "analysis" IN_LIST arg_DEPENDS)
+    target_precompile_headers(${name} PRIVATE ${CMAKE_SOURCE_DIR}/cmake/precompiled/numeric.h)
+  else()
+    target_precompile_headers(${name} PRIVATE ${CMAKE_SOURCE_DIR}/cmake/precompiled/common.h)
+  endif()
 endfunction()

@@ -1,0 +1,6 @@
+// As common.h, for folders that compute with matrices.
+#pragma once
+
+#include "common.h"
+
+#include <Eigen/Dense>
