@@ -73,6 +73,15 @@ constexpr Printed kPrinted[] = {
     {"railway", "waypoints", "ibs", "flown; no error printed"},
 };
 
+/// A column of the rows that are kept, to a tenth of a millimetre.
+template <typename Value>
+nlohmann::ordered_json column(const FlightLog& log, Value value) {
+  constexpr std::size_t kEvery = 5;  // of 50 rows a second
+  nlohmann::ordered_json values = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < log.rows.size(); i += kEvery) values.push_back(rounded(value(log.rows[i])));
+  return values;
+}
+
 std::string comparison_csv(const FlownScenario& flown) {
   std::string text =
       "controller,runs,rms_y_mm,rms_z_mm,max_y_mm,max_z_mm,p95_y_mm,p95_z_mm,ci95_low_mm,ci95_high_mm,"
@@ -93,6 +102,32 @@ std::string comparison_csv(const FlownScenario& flown) {
 }
 
 }  // namespace
+
+std::string flight_for_report(const FlownScenario& flown, const FlightTask& task, const std::string& map) {
+  nlohmann::ordered_json json = scenario_json(flown, map, task.seed);
+  json["position"] = task.localisation ? "lidar" : "given";
+  json["walls"] = nlohmann::ordered_json::array();
+  for (const auto& edge : task.space->walls.edges())
+    json["walls"].push_back({rounded(edge.from[0]), rounded(edge.from[1])});
+  for (std::size_t i = 0; i < flown.logs.size(); ++i) {
+    const FlightLog& log = flown.logs[i];
+    if (i == 0) {
+      json["reference"] = {{"time_s", column(log, [](const LogRow& r) { return r.time_s; })},
+                           {"y_m", column(log, [](const LogRow& r) { return r.reference_m[0]; })},
+                           {"z_m", column(log, [](const LogRow& r) { return r.reference_m[1]; })}};
+    }
+    json["controllers"][i]["path"] = {{"y_m", column(log, [](const LogRow& r) { return r.position_m[0]; })},
+                                      {"z_m", column(log, [](const LogRow& r) { return r.position_m[1]; })}};
+  }
+  return json.dump();
+}
+
+std::string flights_json(const std::vector<std::string>& flights, const std::string& command) {
+  nlohmann::ordered_json json{{"format", "tunnelrig-flights/1"}, {"command", command}, {"flights", {}}};
+  json["flights"] = nlohmann::ordered_json::array();
+  for (const std::string& one : flights) json["flights"].push_back(nlohmann::ordered_json::parse(one));
+  return json.dump() + "\n";
+}
 
 void print_flown(const FlownScenario& flown) {
   fmt::print("{} in the {} tunnel, {} runs\n", flown.scenario, flown.tunnel,
