@@ -50,7 +50,7 @@ std::string wrong_with(const Json& flight) {
 }  // namespace
 
 Json flights_section(const std::string& path) {
-  const Json document = Json::parse(read_text(path), nullptr, false);
+  Json document = Json::parse(read_text(path), nullptr, false);
   if (!document.is_object() || document.value("format", Json()) != kFormat ||
       !document.value("flights", Json()).is_array() || document["flights"].empty() ||
       !document.value("command", Json()).is_string())
