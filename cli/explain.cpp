@@ -83,8 +83,8 @@ int run(Options options) {
   const std::vector<Effect> axes = effects_of_other_axes(observations);
   std::vector<const Effect*> effects = candidates.all;
   for (const Effect& axis : axes) effects.push_back(&axis);
-  const bool adopting = options.adopt || options.adopt_empirical;
-  if (adopting) require_adoptable(observations);
+  if (options.adopt) require_adoptable(observations);
+  options.search.empirical = options.adopt_empirical;
   ProgressBar progress("explaining");
   double step = 0;
   options.search.progress = [&](const std::string& what) {
@@ -102,7 +102,12 @@ int run(Options options) {
   if (!options.html.empty())
     write_text(options.html, explanation_html(explanation, observations, options.search,
                                               {options.db, program_version(), arguments(), now_utc()}));
-  if (adopting) adopt_and_store(options, observations, explanation);
+  if (options.adopt_empirical && !adoptable(observations))
+    warn(
+        "a model corrects the thrusts of a campaign: the curve is in the errors above, and nothing is "
+        "stored");
+  else if (options.adopt || options.adopt_empirical)
+    adopt_and_store(options, observations, explanation);
   return kWell;
 }
 
@@ -130,6 +135,10 @@ void add_explain(CLI::App& app, Work& work) {
       ->check(CLI::Range(99, 99999))
       ->capture_default_str();
   verb->add_option("--seed", options->search.seed, "Of seal and simulations")->capture_default_str();
+  verb->add_option("--session-ratio", options->search.session_ratio,
+                   "Session scatter over run scatter above which it is an unknown")
+      ->check(CLI::Range(0.1, 7.0))
+      ->capture_default_str();
   verb->add_option("--json", options->json,
                    "Write the explanation as JSON to this file (- for standard output)");
   verb->add_option("--html", options->html, "Write a page with the pictures");
@@ -140,7 +149,7 @@ void add_explain(CLI::App& app, Work& work) {
                  "Print the candidates, and with --db whether this data can test them");
   verb->add_flag("--adopt", options->adopt, "Store the accepted effects as the next version of the model");
   verb->add_flag("--adopt-empirical", options->adopt_empirical,
-                 "Store with them the curves that have no name");
+                 "Count the curves that have no name in the error after, and store them with the effects");
   verb->callback([options, &work] { work = [options] { return run(*options); }; });
 }
 

@@ -9,10 +9,21 @@ target_compile_options(tunnelrig_options INTERFACE
   # gcc 12 warns of designated initialisers that leave defaulted members out, which is what they are for
   -Wno-missing-field-initializers)
 if(TUNNELRIG_SANITIZE)
-  target_compile_options(tunnelrig_options INTERFACE
-    -fsanitize=${TUNNELRIG_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
-  target_link_options(tunnelrig_options INTERFACE -fsanitize=${TUNNELRIG_SANITIZE})
+  add_compile_options(-fsanitize=${TUNNELRIG_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${TUNNELRIG_SANITIZE})
 endif()
+if(TUNNELRIG_FUZZ)
+  # All code counts its branches; what has no main of libFuzzer is linked without it.
+  add_compile_options(-fsanitize=fuzzer-no-link)
+endif()
+
+# For folders full of Eigen: checks of every access that AddressSanitizer makes as well would triple the time that they take to
+# compile. Folders that read bytes from outside keep them.
+macro(tunnelrig_fewer_checks)
+  if(TUNNELRIG_SANITIZE MATCHES "undefined")
+    add_compile_options(-fno-sanitize=null,alignment,object-size,vptr)
+  endif()
+endmacro()
 
 # Headers stand beside their sources and are included as "folder/name.h". So that CMake, not good manners, keeps
 # dependencies one way, each folder is seen through an include directory of its own that holds a link to it alone.

@@ -106,9 +106,13 @@ bool acts_on_means(const Curve& curve) { return curve.x.size() > 0; }
 
 }  // namespace
 
+bool adoptable(const Observations& observations) {
+  return observations.response == "thrust" &&
+         (observations.baseline == "thesis" || observations.baseline == "open_space");
+}
+
 void require_adoptable(const Observations& observations) {
-  if (observations.response != "thrust" ||
-      (observations.baseline != "thesis" && observations.baseline != "open_space"))
+  if (!adoptable(observations))
     throw InputError(
         fmt::format("--adopt: a model corrects the thrusts of a campaign, and this explains {} of {}",
                     observations.response, observations.campaign));

@@ -14,6 +14,9 @@ struct Adoption {
   std::vector<std::string> notes;
 };
 
+/// Whether a model can correct the response: the thrusts of a campaign.
+bool adoptable(const Observations& observations);
+
 /// Throws InputError unless the explanation is of a campaign's thrusts, which are what a model corrects; for
 /// what is asked of `adopt`, before hours are spent on an explanation.
 void require_adoptable(const Observations& observations);

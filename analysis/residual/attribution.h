@@ -17,6 +17,7 @@ struct SearchSettings {
   int most_curves = 3;
   std::size_t simulations = 999;
   std::uint64_t seed = 1;
+  bool empirical = false;    // curves without a name are a part of the model after
   double session_ratio = 2;  // session scatter is an unknown where σ_session/σ_run is above it beyond doubt
   std::function<void(const std::string&)> progress = [](const std::string&) {};
 };

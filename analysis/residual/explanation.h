@@ -72,6 +72,7 @@ struct Explanation {
   std::vector<Untestable> untestable;
   std::vector<SuspectRow> suspect_rows;
   std::vector<std::string> warnings;
+  std::vector<std::string> empirical;  // curves that `after` has in it, because they were asked for
   double detectable = 0;
 
   // what the pages show beside it

@@ -103,6 +103,7 @@ std::string explanation_json(const Explanation& e) {
             {"untestable", Json::array()},
             {"suspect_rows", Json::array()},
             {"detectable_at_80_percent_power", finite(e.detectable)},
+            {"empirical", e.empirical},
             {"warnings", e.warnings}};
   for (const AdoptedEffect& adopted : e.adopted) json["adopted"].push_back(adopted_json(adopted));
   for (const UnknownStructure& unknown : e.unknown) json["unknown"].push_back(unknown_json(unknown));
@@ -137,6 +138,8 @@ std::string explanation_text(const Explanation& e) {
       unit.empty() ? "" : " [" + e.unit + "]", e.before.held_out_rmse, e.before.held_out_low,
       e.before.held_out_high, e.after.held_out_rmse, e.after.held_out_low, e.after.held_out_high,
       e.noise_floor);
+  if (!e.empirical.empty())
+    text += fmt::format("after is with the empirical curve over {}\n", joined(e.empirical));
   if (e.verdict == "no_structure")
     text += fmt::format("no effect above {:.3g}{} (rms) at 80 % power\n", e.detectable, unit);
   if (!e.untestable.empty()) {

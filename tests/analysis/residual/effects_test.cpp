@@ -1,12 +1,16 @@
 // Every candidate effect, by what all of them must be.
 #include "analysis/effects/effect.h"
+#include "analysis/effects/expression_effect.h"
+#include "datasets/csv.h"
 #include "support/seeds.h"
 
 #include <cmath>
 #include <map>
 #include <random>
 #include <set>
+#include <sstream>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 namespace tunnelrig {
@@ -209,6 +213,55 @@ TEST(Effects, DerivativesAreThoseOfTheFormula) {
       }
     }
   }
+}
+
+/// Lines of docs/effects.md.
+std::vector<std::string> page() {
+  std::vector<std::string> lines;
+  std::istringstream text(read_text(TUNNELRIG_DOCS "/effects.md"));
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  return lines;
+}
+
+TEST(Effects, StandInTheDocumentsWithFormulaBoundsAndCovariates) {
+  const std::vector<std::string> lines = page();
+  std::size_t found = 0;
+  for (const Effect& effect : all_effects()) {
+    SCOPED_TRACE(title(effect));
+    const std::string form = effect.form.empty() ? "" : " (" + effect.form + ")";
+    const std::string start = fmt::format("| `{}`{} | {} |", effect.name, form, effect.formula);
+    const auto line = std::find_if(lines.begin(), lines.end(),
+                                   [&](const std::string& text) { return text.starts_with(start); });
+    ASSERT_NE(line, lines.end()) << "docs/effects.md has no line " << start;
+    ++found;
+    for (const EffectParameter& p : effect.parameters) {
+      if (p.role == ParameterRole::kChangePoint) continue;
+      const std::string unit = p.unit == "1" ? "" : " [" + p.unit + "]";
+      const std::string theory = p.theory ? fmt::format(", theory {:g}", *p.theory) : "";
+      EXPECT_THAT(*line, testing::HasSubstr(
+                             fmt::format("{}{} {:g} … {:g}{}", p.name, unit, p.lower, p.upper, theory)));
+    }
+    for (const std::string& covariate : effect.covariates)
+      EXPECT_THAT(*line, testing::HasSubstr("`" + covariate + "`"));
+    EXPECT_THAT(*line, testing::HasSubstr(effect.physics));
+  }
+  const auto table_lines =
+      static_cast<std::size_t>(std::count_if(lines.begin(), lines.end(), [](const std::string& line) {
+        return line.starts_with("| `") && line.find(" | F ") != std::string::npos;
+      }));
+  EXPECT_EQ(table_lines, found) << "docs/effects.md has an effect that the program has not";
+}
+
+TEST(Effects, TheDocumentsExampleOfExpressionsIsRead) {
+  std::string toml;
+  bool within = false;
+  for (const std::string& line : page()) {
+    within = (within || line == "    [[effects]]") && !line.starts_with("    tunnelrig");
+    if (within) toml += line + "\n";
+  }
+  const std::vector<Effect> effects = parse_effects_toml(toml, "docs/effects.md");
+  ASSERT_EQ(effects.size(), 2u);
+  EXPECT_EQ(effects[1].parameters.size(), 2u);
 }
 
 }  // namespace

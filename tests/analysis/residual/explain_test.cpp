@@ -49,7 +49,7 @@ void expect_contract(const Explanation& explanation) {
   const json written = json::parse(explanation_json(explanation));
   for (const char* key : {"format", "campaign", "response", "unit", "baseline", "verdict", "noise_floor",
                           "blocks", "runs", "before", "after", "adopted", "unknown", "untestable",
-                          "suspect_rows", "detectable_at_80_percent_power"})
+                          "suspect_rows", "detectable_at_80_percent_power", "empirical"})
     EXPECT_TRUE(written.contains(key)) << key;
   EXPECT_EQ(written["format"], "tunnelrig-explain/1");
   for (const char* when : {"before", "after"}) {
@@ -156,6 +156,17 @@ TEST_F(ExplainTest, StructureWithoutANameIsUnknown) {
   EXPECT_EQ(e.after.held_out_rmse, e.before.held_out_rmse) << "a curve without a name is not adopted";
   expect_contract(e);
   EXPECT_THAT(explanation_text(e), HasSubstr("depends on cable_slack_mm"));
+  EXPECT_TRUE(e.empirical.empty());
+
+  SearchSettings empirical = quick();
+  empirical.empirical = true;
+  const Explanation curved = explain(o, test::every_effect(), empirical);
+  EXPECT_EQ(curved.verdict, "unknown") << "a curve is no cause";
+  EXPECT_THAT(curved.empirical, testing::ElementsAre("cable_slack_mm"));
+  EXPECT_GT(curved.before.held_out_rmse, 1.5 * curved.after.held_out_rmse);
+  EXPECT_NEAR(curved.after.held_out_rmse / curved.noise_floor, 1, 0.25);
+  EXPECT_THAT(explanation_text(curved), HasSubstr("with the empirical curve over cable_slack_mm"));
+  expect_contract(curved);
 
   test::add_effect(o, "supply_voltage", {0.6});
   const Explanation both = explained(o);

@@ -1,0 +1,104 @@
+// What the conditions of the runs cannot show.
+#include "analysis/residual/explanation_parts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+std::vector<Untestable> untestable_effects(const Observations& observations,
+                                           const std::vector<const Effect*>& effects,
+                                           const std::vector<int>& rows) {
+  std::map<std::string, std::vector<Untestable>> by_name;
+  std::set<std::string> testable;
+  const MixedModel mixed(observations, rows, {0});
+  const MatrixXd predicted = predict_response(observations, {}, rows);
+  for (const Effect* effect : effects) {
+    const Testability can = testability(*effect, observations);
+    std::string reason = can.reason;
+    if (can.ok()) {
+      const std::vector<Term> ways = ways_to_try(*effect, observations, rows);
+      if (ways.empty()) reason = "there are too few blocks on both sides of any step";
+      bool seen = false;
+      for (const Term& way : ways) {
+        const TermResponse response = respond(way, observations, predicted);
+        double before = 0, after = 0;
+        for (std::size_t s = 0; s < mixed.strata().size(); ++s) {
+          Stacked column = mixed.stack(s, {&response.derivative[0]});
+          before += column.squaredNorm();
+          mixed.project(s, 0, column);
+          after += column.squaredNorm();
+        }
+        if (after > 1e-14 * before && after > 0) {
+          seen = true;
+          break;
+        }
+      }
+      if (!seen && reason.empty())
+        reason = "it does not vary within any location, so the location's coefficient absorbs it";
+      if (seen) {
+        testable.insert(effect->name);
+        continue;
+      }
+    }
+    by_name[effect->name].push_back({effect->name, reason, can.missing});
+  }
+  std::vector<Untestable> result;
+  for (auto& [name, list] : by_name)
+    if (!testable.contains(name)) result.push_back(std::move(list.front()));
+  return result;
+}
+
+void warn_of_constant(const Observations& observations, Explanation& explanation) {
+  std::set<std::string> constant;
+  for (const Untestable& entry : explanation.untestable)
+    for (const Effect& effect : all_effects())
+      for (const std::string& name : effect.covariates) {
+        const Covariate* covariate = observations.find(name);
+        if (entry.effect == effect.name && entry.missing.empty() && covariate != nullptr &&
+            !covariate->derived && covariate->value.maxCoeff() == covariate->value.minCoeff())
+          constant.insert(name);
+      }
+  for (const std::string& name : constant)
+    explanation.warnings.push_back(name + " is the same in every run: nothing can be found that follows it");
+}
+
+void warn_of_collinear(const Observations& observations, Explanation& explanation) {
+  for (std::size_t a = 0; a < observations.covariates.size(); ++a)
+    for (std::size_t b = a + 1; b < observations.covariates.size(); ++b) {
+      const Covariate &first = observations.covariates[a], &second = observations.covariates[b];
+      if (first.derived && second.derived) continue;
+      if (first.value.array().isNaN().any() || second.value.array().isNaN().any()) continue;
+      const VectorXd u = first.value.col(0).array() - first.value.col(0).mean(),
+                     v = second.value.col(0).array() - second.value.col(0).mean();
+      if (u.norm() == 0 || v.norm() == 0) continue;
+      const double correlation = u.dot(v) / u.norm() / v.norm();
+      if (std::abs(correlation) < 0.999) continue;
+      explanation.warnings.push_back(
+          fmt::format("{} and {} go together (correlation {:.4f}): effects of the two cannot be told apart",
+                      first.name, second.name, correlation));
+      for (const Effect& effect : all_effects())
+        for (const std::string& covariate : effect.covariates)
+          if (covariate == second.name || covariate == first.name)
+            explanation.untestable.push_back(
+                {effect.name,
+                 fmt::format("{} is collinear with {}: it is tried, but not on its own", covariate,
+                             covariate == first.name ? second.name : first.name),
+                 {}});
+    }
+  std::vector<Untestable> once;
+  for (const Untestable& entry : explanation.untestable)
+    if (std::none_of(once.begin(), once.end(), [&](const Untestable& u) { return u.effect == entry.effect; }))
+      once.push_back(entry);
+  explanation.untestable = std::move(once);
+}
+
+}  // namespace tunnelrig

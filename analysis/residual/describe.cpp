@@ -1,0 +1,79 @@
+// Structure without a name, as a curve with its band.
+#include "analysis/residual/explanation_parts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
+                          const std::vector<int>& rows) {
+  constexpr int kPoints = 25;
+  UnknownStructure result{found.curve.covariate, found.curve.rotor, found.p, 0, {}};
+  const Components y = difference(response_components(observations), fit.linear.offset);
+  const AmplitudeFit amplitudes = fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);
+  Index first = static_cast<Index>(fit.linear.columns.size());
+  for (auto curve = fit.model.curves.rbegin(); curve != fit.model.curves.rend(); ++curve) {
+    first -= static_cast<Index>(curve->columns.size());
+    if (curve->covariate == found.curve.covariate && curve->rotor == found.curve.rotor) break;
+  }
+  const Index k = static_cast<Index>(found.curve.columns.size());
+  const VectorXd amplitude = amplitudes.amplitude.segment(first, k);
+  const MatrixXd covariance = amplitudes.covariance.block(first, first, k, k);
+  const double scale = observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
+  const bool within = found.curve.x.size() == 0;
+  const double low = within ? 0 : found.curve.x.minCoeff();
+  const double high = within ? observations.duration_s.maxCoeff() : found.curve.x.maxCoeff();
+  double mean = 0;
+  for (int p = 0; p < kPoints; ++p) {
+    const double u = static_cast<double>(p) / (kPoints - 1);
+    VectorXd basis(k);
+    for (Index b = 0; b < k; ++b) basis(b) = std::cos(std::numbers::pi * static_cast<double>(b + 1) * u);
+    const double value = scale * basis.dot(amplitude),
+                 half = 1.96 * scale * std::sqrt(std::max(0.0, basis.dot(covariance * basis)));
+    result.shape.push_back({low + u * (high - low), value, value - half, value + half});
+    mean += value / kPoints;
+  }
+  double lowest = 1e300, highest = -1e300;
+  for (ShapePoint& point : result.shape) {
+    point.y -= mean;
+    point.low -= mean;
+    point.high -= mean;
+    lowest = std::min(lowest, point.y);
+    highest = std::max(highest, point.y);
+  }
+  result.amplitude = (highest - lowest) / 2;
+  return result;
+}
+
+UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual,
+                                   const std::vector<int>& rows) {
+  UnknownStructure result{"session", -1, 0.025, 0, {}};
+  std::map<int, std::vector<double>> offsets;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const double mean = -residual.row(static_cast<Index>(r)).mean();
+    if (!std::isnan(mean)) offsets[observations.block[static_cast<std::size_t>(rows[r])]].push_back(mean);
+  }
+  double lowest = 1e300, highest = -1e300;
+  for (const auto& [block, values] : offsets) {
+    const double n = static_cast<double>(values.size());
+    const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+    double squares = 0;
+    for (const double value : values) squares += (value - mean) * (value - mean);
+    const double half = 1.96 * std::sqrt(squares / std::max(1.0, n - 1) / n);
+    result.shape.push_back({static_cast<double>(block + 1), mean, mean - half, mean + half});
+    lowest = std::min(lowest, mean);
+    highest = std::max(highest, mean);
+  }
+  result.amplitude = (highest - lowest) / 2;
+  return result;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,61 @@
+// Parts of an explanation, in the order in which explain() puts them together.
+#pragma once
+
+#include "analysis/residual/explanation.h"
+
+namespace tunnelrig {
+
+std::vector<int> all_rows(const Observations& observations);
+
+// --- conditions.cpp
+
+std::vector<Untestable> untestable_effects(const Observations& observations,
+                                           const std::vector<const Effect*>& effects,
+                                           const std::vector<int>& rows);
+
+/// Conditions that never changed, and so keep an effect from being tested.
+void warn_of_constant(const Observations& observations, Explanation& explanation);
+
+/// Pairs of covariates that no campaign of this design can tell apart.
+void warn_of_collinear(const Observations& observations, Explanation& explanation);
+
+// --- estimates.cpp
+
+/// Interval of a root mean square whose blocks are resampled; Student's t for their number, on the logarithm.
+void set_interval(const Observations& observations, const HeldOutErrors& errors, std::uint64_t seed,
+                  ErrorEstimate& estimate);
+
+/// Jackknife over blocks: value and 95 % interval of every parameter of every term.
+std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observations& observations,
+                                                                const JointFit& fit,
+                                                                const std::vector<int>& rows);
+
+/// Amplitudes of each group's own: their median over the groups, and its interval.
+ParameterEstimate estimate_over_groups(const Observations& observations, const Term& term,
+                                       const std::vector<int>& rows);
+
+// --- describe.cpp
+
+/// The curve over its covariate, in the response's unit, with a 95 % band.
+UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
+                          const std::vector<int>& rows);
+
+/// Session scatter that no covariate explains: the sessions' offsets themselves are the shape.
+UnknownStructure describe_sessions(const Observations& observations, const Eigen::MatrixXd& residual,
+                                   const std::vector<int>& rows);
+
+// --- suspects.cpp
+
+double degrees_of_freedom(const Observations& observations, const JointFit& fit,
+                          const std::vector<int>& rows);
+
+/// Rows whose externally studentised residual is beyond what n normal ones reach once in a hundred data sets.
+/// `errors` are of the fitted rows: their variance is σ²(1 − h), where expected_std has σ²(1 + h).
+std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
+                                     const NullFit& variances, double dof);
+
+/// The worst row of a table whose rows stand for themselves, if it is beyond doubt with all that the other
+/// axes can explain in the model.
+std::optional<SuspectRow> gross_row(const Observations& observations);
+
+}  // namespace tunnelrig

@@ -1,0 +1,58 @@
+// What the largest evidence of all candidates is where there is no effect.
+#pragma once
+
+#include "analysis/residual/attribution.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace tunnelrig {
+
+/// Simulated as they are asked for: early enough that a campaign without effect costs little, and never
+/// before the p that was asked for is settled (Besag & Clifford 1991).
+class NullMaxima {
+ public:
+  NullMaxima(const CandidateScan& scan, const NullFit& null, const SearchSettings& settings,
+             std::uint64_t salt)
+      : scan_(scan), null_(null), settings_(settings), random_(settings.seed * 1000003 + salt) {}
+
+  double p(double evidence) {
+    constexpr std::size_t kBatch = 111, kEnough = 30;
+    std::size_t above = count(evidence);
+    while (maxima_.size() < settings_.simulations && above < kEnough) {
+      const auto batch =
+          scan_.simulated_maxima(null_, std::min(kBatch, settings_.simulations - maxima_.size()), random_);
+      maxima_.insert(maxima_.end(), batch.begin(), batch.end());
+      above = count(evidence);
+    }
+    return (1.0 + static_cast<double>(above)) / (1.0 + static_cast<double>(maxima_.size()));
+  }
+
+  /// The evidence that only α of the null campaigns exceed.
+  double critical() {
+    p(1e9);  // all of them
+    std::vector<double> sorted = maxima_;
+    std::sort(sorted.begin(), sorted.end());
+    const auto rank =
+        static_cast<std::size_t>(std::ceil((1 - settings_.alpha) * static_cast<double>(sorted.size() + 1))) -
+        1;
+    return sorted[std::min(rank, sorted.size() - 1)];
+  }
+  const std::vector<double>& values() const { return maxima_; }
+
+ private:
+  std::size_t count(double evidence) const {
+    return static_cast<std::size_t>(
+        std::count_if(maxima_.begin(), maxima_.end(), [&](double m) { return m >= evidence; }));
+  }
+
+  const CandidateScan& scan_;
+  const NullFit& null_;
+  const SearchSettings& settings_;
+  std::mt19937_64 random_;
+  std::vector<double> maxima_;
+};
+
+}  // namespace tunnelrig

@@ -1,0 +1,90 @@
+// The search for effects, and for structure that has no name, as one state: the model so far, and what was
+// seen on the way.
+#pragma once
+
+#include "analysis/residual/attribution.h"
+
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace tunnelrig {
+
+class NullMaxima;
+
+class Search {
+ public:
+  Search(const Observations& observations, const std::vector<int>& rows,
+         const std::vector<const Effect*>& effects, const SearchSettings& settings);
+  Attribution run();
+
+ private:
+  struct Scan {
+    std::vector<Term> ways;
+    std::vector<Candidate> candidates;
+    std::vector<CandidateFit> fits;
+    std::unique_ptr<CandidateScan> scan;
+    std::vector<std::size_t> order;  // by evidence, best first
+  };
+
+  // named effects: search_effects.cpp
+  void add_effects();
+  bool already_in(const Term& way) const;
+  /// All candidates on top of a model.
+  Scan scan_effects(const JointFit& base) const;
+  Candidate candidate_of(const Term& way, const Eigen::MatrixXd& predicted) const;
+  /// What groups' constants absorb cannot be tested.
+  bool can_be_seen(const Candidate& candidate) const;
+  void rank(const JointFit& base, Scan& scan) const;
+  bool add_best_effect();
+  std::vector<Ranked> ranking(const Scan& scan, NullMaxima& maxima) const;
+  /// The best candidate whose parameters stay within physics and which predicts blocks that it has not seen.
+  bool accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round);
+  /// The newest effect with an amplitude of each group's own, where the data ask for it.
+  void let_groups_differ();
+  /// Of the runs' means within the fit, and its degrees of freedom.
+  std::pair<double, double> sum_of_squares(const Observations& observations, const JointFit& fit) const;
+  /// A joint fit with one term more; theory's coefficient where the data do not speak against it.
+  JointFit fit_with(Term term, double amplitude) const;
+  void read_back_terms();
+  /// With a new effect in, an older one may be explained better by another: it gives way.
+  void swap_weaker();
+  double evidence_of(const Scan& scan, const Term& term) const;
+  JointFit fit_without(std::size_t t) const;
+  /// An effect of typical shape, at the size that passes α four times in five.
+  void set_detectable(const Scan& scan);
+  double rms_of(const Eigen::MatrixXd& column) const;
+
+  // structure without a name: search_curves.cpp
+  void add_curves();
+  bool add_best_curve();
+  /// A name whose work a curve does as well was the wrong name for that curve.
+  void drop_what_a_curve_replaces();
+  bool session_scatter_is_large() const;
+
+  // what cannot be told apart: search_rivals.cpp
+  void find_confounded();
+  /// One way of each other effect that α would let in and that predicts unseen blocks about as well.
+  std::vector<Ranked> rivals(const Accepted& accepted, const JointFit& without, const Scan& scan) const;
+  /// The same for an effect with an amplitude of each group's own: each rival takes its place in the
+  /// baseline.
+  std::vector<Ranked> rivals_in_groups(const Accepted& accepted) const;
+
+  Observations observations_;  // a group's own amplitudes become a part of its baseline
+  const std::vector<int>& rows_;
+  const SearchSettings& settings_;
+  std::unique_ptr<MixedModel> mixed_;
+  std::vector<Term> ways_;
+  std::vector<Curve> curves_;
+  Components y_;
+  std::map<std::string, std::size_t> points_;  // change-points tried of an effect and rotor
+  JointFit fit_;
+  Attribution result_;
+  std::vector<std::vector<Ranked>> confounded_;
+  double critical_ = 0;
+  std::uint64_t salt_ = 0;
+};
+
+}  // namespace tunnelrig

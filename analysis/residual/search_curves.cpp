@@ -1,0 +1,85 @@
+// Structure without a name.
+#include "analysis/residual/null_maxima.h"
+#include "analysis/residual/search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+constexpr double kKeptP = 0.01;  // an effect stays beside a curve only if its own p is below
+
+}  // namespace
+
+void Search::add_curves() {
+  while (static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve()) {
+    drop_what_a_curve_replaces();
+    add_effects();
+  }
+}
+
+bool Search::add_best_curve() {
+  settings_.progress("looking for structure without a name");
+  Scan scan;
+  std::vector<std::size_t> tried;
+  for (std::size_t c = 0; c < curves_.size(); ++c) {
+    const bool in = std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
+      return found.curve.covariate == curves_[c].covariate &&
+             (found.curve.rotor < 0 || found.curve.rotor == curves_[c].rotor);
+    });
+    if (in) continue;
+    Candidate candidate = as_candidate(curves_[c]);
+    if (!can_be_seen(candidate)) continue;
+    scan.candidates.push_back(std::move(candidate));
+    tried.push_back(c);
+  }
+  if (tried.empty()) return false;
+  rank(fit_, scan);
+  NullMaxima maxima(*scan.scan, fit_.variances, settings_, 1000 + ++salt_);
+  const std::size_t best = scan.order[0];
+  const double p = maxima.p(scan.fits[best].evidence);
+  Round round;
+  round.observed = scan.fits[best].evidence;
+  round.null_maxima = maxima.values();
+  round.outcome = fmt::format("p = {:.3g} for {}", p, curves_[tried[best]].label());
+  result_.curve_rounds.push_back(std::move(round));
+  if (p > settings_.alpha) return false;
+  result_.curves.push_back({curves_[tried[best]], p});
+  MeanModel model = fit_.model;
+  model.curves.push_back(curves_[tried[best]]);
+  fit_ = fit_jointly(observations_, model, rows_);
+  read_back_terms();
+  return true;
+}
+
+void Search::drop_what_a_curve_replaces() {
+  for (std::size_t t = result_.accepted.size(); t-- > 0;) {
+    if (result_.accepted[t].term.per_group) continue;  // stands in the baseline
+    const JointFit without = fit_without(t);
+    const double ratio = std::max(0.0, fit_.variances.log_likelihood - without.variances.log_likelihood);
+    const double z = std::sqrt(2 * ratio);
+    if (std::erfc(z / std::numbers::sqrt2) < kKeptP) continue;
+    result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
+    fit_ = without;
+    read_back_terms();
+  }
+}
+
+bool Search::session_scatter_is_large() const {
+  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
+    if (!mixed_->strata()[s].means()) continue;
+    double below = 0;
+    for (std::size_t r = 0; r < fit_.variances.ratio_probability[s].size(); ++r) {
+      if (kRatios[r] <= settings_.session_ratio * settings_.session_ratio)
+        below += fit_.variances.ratio_probability[s][r];
+    }
+    if (below < 0.025) return true;
+  }
+  return false;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,300 @@
+// Named effects: ranked, tried, accepted one by one.
+#include "analysis/residual/null_maxima.h"
+#include "analysis/residual/search.h"
+#include "calibration/distributions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kKnownPhysicsWeight = 10;  // theory gives the coefficient: a prior that others lack
+constexpr double kSwapDecades = 0.7;        // another explains that much better: it takes the place
+
+double prior_weight(const Term& term, std::size_t ways) {
+  const Effect& effect = *term.effect;
+  double weight = effect.theory() ? kKnownPhysicsWeight : 1;
+  if (effect.scope == EffectScope::kRotor && term.rotor >= 0) weight /= 4;
+  if (effect.scope == EffectScope::kPair) weight /= 12;
+  if (effect.has_change_point()) weight /= std::max<double>(1, static_cast<double>(ways));
+  return weight;
+}
+
+}  // namespace
+
+void Search::add_effects() {
+  while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect())
+    swap_weaker();
+}
+
+bool Search::already_in(const Term& way) const {
+  return std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& accepted) {
+    const bool another_axis = way.effect->name == "crosstalk" && accepted.term.effect != way.effect;
+    return !another_axis && accepted.term.effect->name == way.effect->name &&
+           (accepted.term.rotor == way.rotor || accepted.term.rotor < 0 || way.rotor < 0) &&
+           accepted.term.other == way.other && !way.effect->has_change_point();
+  });
+}
+
+Search::Scan Search::scan_effects(const JointFit& base) const {
+  Scan scan;
+  const Eigen::MatrixXd predicted = predict_response(observations_, base.model, rows_);
+  for (const Term& way : ways_) {
+    if (already_in(way)) continue;
+    Candidate candidate = candidate_of(way, predicted);
+    if (!can_be_seen(candidate)) continue;
+    scan.ways.push_back(way);
+    scan.candidates.push_back(std::move(candidate));
+  }
+  rank(base, scan);
+  return scan;
+}
+
+Candidate Search::candidate_of(const Term& way, const Eigen::MatrixXd& predicted) const {
+  const EffectParameter& amplitude = way.effect->parameters[0];
+  const std::size_t points = points_.at(way.effect->name + std::to_string(way.rotor));
+  return {.columns = {respond(way, observations_, predicted).derivative[0]},
+          .sign = amplitude.lower >= 0   ? 1
+                  : amplitude.upper <= 0 ? -1
+                                         : 0,
+          .weight = prior_weight(way, points)};
+}
+
+bool Search::can_be_seen(const Candidate& candidate) const {
+  double before = 0, after = 0;
+  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
+    Stacked column = mixed_->stack(s, {&candidate.columns[0]});
+    before += column.squaredNorm();
+    mixed_->project(s, 0, column);
+    after += column.squaredNorm();
+  }
+  return after > 1e-14 * before && after > 0;
+}
+
+void Search::rank(const JointFit& base, Scan& scan) const {
+  scan.scan = std::make_unique<CandidateScan>(*mixed_, base.linear.columns, scan.candidates);
+  scan.fits = scan.scan->fit(difference(y_, base.linear.offset));
+  scan.order.resize(scan.fits.size());
+  std::iota(scan.order.begin(), scan.order.end(), 0U);
+  std::sort(scan.order.begin(), scan.order.end(),
+            [&](std::size_t a, std::size_t b) { return scan.fits[a].evidence > scan.fits[b].evidence; });
+}
+
+bool Search::add_best_effect() {
+  settings_.progress(fmt::format("looking for effect {}", result_.accepted.size() + 1));
+  const Scan scan = scan_effects(fit_);
+  Round round;
+  if (scan.order.empty()) return false;
+  NullMaxima maxima(*scan.scan, fit_.variances, settings_, ++salt_);
+  const double p = maxima.p(scan.fits[scan.order[0]].evidence);
+  if (p <= settings_.alpha || critical_ == 0) critical_ = maxima.critical();
+  round.observed = scan.fits[scan.order[0]].evidence;
+  round.critical = critical_;
+  round.ranking = ranking(scan, maxima);
+  round.null_maxima = maxima.values();
+  if (result_.rounds.empty()) set_detectable(scan);
+  const bool added = p <= settings_.alpha && accept_first_sound(scan, maxima, round);
+  if (!added && round.outcome.empty())
+    round.outcome = fmt::format("nothing: p = {:.3g} for {}", p, scan.ways[scan.order[0]].label());
+  result_.rounds.push_back(std::move(round));
+  return added;
+}
+
+std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const {
+  std::vector<Ranked> result;
+  for (const std::size_t i : scan.order) {
+    const bool seen = std::any_of(result.begin(), result.end(), [&](const Ranked& r) {
+      return r.term.effect->name == scan.ways[i].effect->name;
+    });
+    if (seen) continue;
+    const double evidence = scan.fits[i].evidence, ratio = scan.fits[i].likelihood_ratio;
+    const double amplitude = scan.fits[i].amplitude.size() > 0 ? scan.fits[i].amplitude(0) : 0;
+    result.push_back({scan.ways[i], evidence, maxima.p(evidence), amplitude,
+                      ratio > 0 ? std::abs(amplitude) / std::sqrt(2 * ratio) : 0});
+  }
+  return result;
+}
+
+bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round) {
+  std::vector<const Effect*> refused;
+  const CrossValidation before = cross_validate(observations_, difference(y_, fit_.linear.offset),
+                                                fit_.linear.columns, fit_.variances, rows_);
+  for (const std::size_t i : scan.order) {
+    if (scan.fits[i].evidence < critical_) break;
+    if (std::find(refused.begin(), refused.end(), scan.ways[i].effect) != refused.end()) continue;
+    refused.push_back(scan.ways[i].effect);
+    JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
+    const Term& term = fit.model.terms.back();
+    if (std::any_of(fit.at_bound.begin(), fit.at_bound.end(), [&](const std::string& b) {
+          return b.starts_with(term.effect->name + " " + term.effect->parameters[0].name);
+        })) {
+      round.outcome += fmt::format("{} would leave its physical bounds; ", term.label());
+      continue;
+    }
+    const CrossValidation after = cross_validate(observations_, difference(y_, fit.linear.offset),
+                                                 fit.linear.columns, fit.variances, rows_);
+    // Both are scored by the variances of the larger model, so that the difference is the mean's.
+    const CrossValidation base = cross_validate(observations_, difference(y_, fit_.linear.offset),
+                                                fit_.linear.columns, fit.variances, rows_);
+    const LossDifference gain = compare(base, after);
+    if (!(gain.mean > gain.standard_error)) {
+      round.outcome += fmt::format("{} does not predict unseen blocks; ", term.label());
+      continue;
+    }
+    result_.accepted.push_back({.term = term,
+                                .p = maxima.p(scan.fits[i].evidence),
+                                .gain = before.rmse() - after.rmse(),
+                                .loss_gain = gain.mean,
+                                .loss_standard_error = gain.standard_error,
+                                .confounded = {}});
+    fit_ = std::move(fit);
+    read_back_terms();
+    if (observations_.channels() == 1 && observations_.groups() > 1) let_groups_differ();
+    round.outcome += "accepted " + result_.accepted.back().term.label();
+    return true;
+  }
+  return false;
+}
+
+void Search::let_groups_differ() {
+  const Term shared = result_.accepted.back().term;
+  Term own = shared;
+  own.per_group = true;
+  own.at_theory = false;
+  own.parameters[0] = 0;
+  Observations wider = observations_;
+  const TermResponse response = respond(own, wider, predict_response(wider, fit_.model, rows_));
+  wider.slopes.conservativeResize(Eigen::NoChange, wider.slopes.cols() + 1);
+  wider.slopes.rightCols(1) = response.derivative[0][0];
+  MeanModel model = fit_.model;
+  model.terms.back() = own;
+  JointFit fit = fit_jointly(wider, model, rows_);
+  const auto before = sum_of_squares(observations_, fit_), after = sum_of_squares(wider, fit);
+  const double more = before.second - after.second;
+  if (more <= 0 || after.second <= 0) return;
+  const double f = (before.first - after.first) / more / (after.first / after.second);
+  if (!(f > 0) || f_upper_p(f, more, after.second) > settings_.alpha) return;
+  const LossDifference gain = compare(
+      cross_validate(observations_, difference(y_, fit_.linear.offset), fit_.linear.columns, fit.variances,
+                     rows_),
+      cross_validate(wider, difference(y_, fit.linear.offset), fit.linear.columns, fit.variances, rows_));
+  if (!(gain.mean > gain.standard_error)) return;
+  observations_ = std::move(wider);
+  mixed_ = std::make_unique<MixedModel>(observations_, rows_);
+  fit_ = std::move(fit);
+  read_back_terms();
+}
+
+std::pair<double, double> Search::sum_of_squares(const Observations& observations,
+                                                 const JointFit& fit) const {
+  const MixedModel mixed(observations, rows_);
+  const double dof = static_cast<double>(mixed.dof(0) - static_cast<Index>(fit.linear.columns.size()));
+  return {std::pow(fit.variances.sigma[0], 2) * static_cast<double>(mixed.dof(0)), dof};
+}
+
+JointFit Search::fit_with(Term term, double amplitude) const {
+  const EffectParameter& parameter = term.effect->parameters[0];
+  term.parameters[0] = std::clamp(amplitude, parameter.lower, parameter.upper);
+  MeanModel model = fit_.model;
+  model.terms.push_back(term);
+  JointFit free = fit_jointly(observations_, model, rows_);
+  if (!parameter.theory) return free;
+  model = free.model;
+  model.terms.back().at_theory = true;
+  model.terms.back().parameters[0] = *parameter.theory;
+  JointFit fixed = fit_jointly(observations_, model, rows_);
+  constexpr double kHalfChi2_95 = 1.92;
+  const bool allowed = free.variances.log_likelihood - fixed.variances.log_likelihood < kHalfChi2_95;
+  return allowed || term.effect->theory_only ? fixed : free;
+}
+
+void Search::read_back_terms() {
+  for (std::size_t t = 0; t < result_.accepted.size(); ++t) result_.accepted[t].term = fit_.model.terms[t];
+}
+
+void Search::swap_weaker() {
+  for (std::size_t t = 0; t + 1 < result_.accepted.size(); ++t) {
+    const Accepted old = result_.accepted[t];
+    if (old.term.per_group) continue;
+    const JointFit without = fit_without(t);
+    result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
+    const Scan scan = scan_effects(without);
+    const double own = evidence_of(scan, old.term);
+    const std::size_t best = scan.order.empty() ? 0 : scan.order[0];
+    const bool swap = !scan.order.empty() && !scan.ways[best].same_way(old.term) &&
+                      scan.fits[best].evidence > own + kSwapDecades;
+    Accepted kept = old;
+    if (swap) {
+      const JointFit current = fit_;
+      fit_ = without;
+      JointFit tried = fit_with(scan.ways[best], scan.fits[best].amplitude(0));
+      if (tried.variances.log_likelihood > current.variances.log_likelihood && tried.at_bound.empty()) {
+        fit_ = std::move(tried);
+        kept.term = fit_.model.terms.back();
+      } else {
+        fit_ = current;
+        result_.accepted.insert(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t), old);
+        continue;
+      }
+      result_.accepted.push_back(kept);
+      read_back_terms();
+    } else {
+      result_.accepted.insert(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t), old);
+    }
+  }
+}
+
+double Search::evidence_of(const Scan& scan, const Term& term) const {
+  double highest = 0;
+  for (std::size_t i = 0; i < scan.ways.size(); ++i)
+    if (scan.ways[i].same_way(term)) highest = std::max(highest, scan.fits[i].evidence);
+  return highest;
+}
+
+JointFit Search::fit_without(std::size_t t) const {
+  MeanModel model = fit_.model;
+  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+  return fit_jointly(observations_, model, rows_);
+}
+
+void Search::set_detectable(const Scan& scan) {
+  std::vector<double> rms;
+  for (std::size_t i = 0; i < scan.candidates.size(); ++i) {
+    if (scan.fits[i].likelihood_ratio <= 0) continue;
+    const double z = std::sqrt(2 * scan.fits[i].likelihood_ratio);
+    const double size = std::abs(scan.fits[i].amplitude(0)) * rms_of(scan.candidates[i].columns[0][0]);
+    if (size > 0) rms.push_back(size / z);
+  }
+  if (rms.empty()) return;
+  std::nth_element(rms.begin(), rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2), rms.end());
+  // evidence to standard errors: −log10 p of a two-sided normal deviate, and 0.84 for four in five
+  double z = 0;
+  while (-std::log10(std::erfc(z / std::numbers::sqrt2)) < critical_) z += 0.01;
+  result_.detectable_sigma = (z + 0.84) * rms[rms.size() / 2];
+}
+
+double Search::rms_of(const Eigen::MatrixXd& column) const {
+  Stacked stacked(0, 0);
+  double squares = 0;
+  Index count = 0;
+  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
+    if (!mixed_->strata()[s].means()) continue;
+    Components components(1 + observations_.shape.size(),
+                          Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
+    components[0] = column;
+    stacked = mixed_->stack(s, {&components});
+    mixed_->project(s, 0, stacked);
+    squares += stacked.squaredNorm();
+    count += stacked.size();
+  }
+  return std::sqrt(squares / static_cast<double>(count));
+}
+
+}  // namespace tunnelrig

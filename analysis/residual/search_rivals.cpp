@@ -1,0 +1,91 @@
+// Effects that do as well as an accepted one.
+#include "analysis/residual/search.h"
+
+#include <algorithm>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+
+void Search::find_confounded() {
+  const std::vector<Accepted> all = result_.accepted;
+  for (std::size_t t = 0; t < all.size(); ++t) {
+    if (all[t].term.per_group) {
+      confounded_.push_back(rivals_in_groups(all[t]));
+      continue;
+    }
+    const JointFit without = fit_without(t);
+    result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
+    const Scan scan = scan_effects(without);
+    result_.accepted = all;
+    result_.accepted[t].confounded = rivals(all[t], without, scan);
+    for (std::size_t k = 0; k < t; ++k) result_.accepted[k].confounded = confounded_[k];
+    confounded_.push_back(result_.accepted[t].confounded);
+  }
+  for (std::size_t t = 0; t < confounded_.size(); ++t) result_.accepted[t].confounded = confounded_[t];
+}
+
+std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& without,
+                                   const Scan& scan) const {
+  std::vector<Ranked> result;
+  const Components y = difference(y_, without.linear.offset);
+  const auto validate = [&](const Candidate& candidate) {
+    std::vector<Components> columns = without.linear.columns;
+    columns.push_back(candidate.columns[0]);
+    return cross_validate(observations_, y, columns, fit_.variances, rows_);
+  };
+  std::optional<CrossValidation> own;
+  for (const std::size_t i : scan.order)
+    if (!own && scan.ways[i].effect->name == accepted.term.effect->name &&
+        scan.ways[i].rotor == accepted.term.rotor)
+      own = validate(scan.candidates[i]);
+  if (!own) return result;
+  std::vector<std::string> done = {accepted.term.effect->name};
+  for (const std::size_t i : scan.order) {
+    if (scan.fits[i].evidence < critical_) break;
+    const std::string& name = scan.ways[i].effect->name;
+    if (std::count(done.begin(), done.end(), name) >= 3) continue;  // three ways of each are tried
+    done.push_back(name);
+    if (name == accepted.term.effect->name) continue;
+    const bool listed = std::any_of(result.begin(), result.end(),
+                                    [&](const Ranked& r) { return r.term.effect->name == name; });
+    if (listed) continue;
+    const LossDifference difference = compare(validate(scan.candidates[i]), *own);
+    if (difference.mean >= 2 * std::min(difference.standard_error, difference.expected_standard_error))
+      continue;
+    Term term = scan.ways[i];
+    term.parameters[0] = scan.fits[i].amplitude(0);
+    result.push_back({term, scan.fits[i].evidence, 0, scan.fits[i].amplitude(0), 0});
+  }
+  return result;
+}
+
+std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
+  std::vector<Ranked> result;
+  Index place = observations_.slopes.cols();
+  for (auto other = result_.accepted.rbegin(); other != result_.accepted.rend(); ++other) {
+    if (!other->term.per_group) continue;
+    --place;
+    if (other->term.effect == accepted.term.effect) break;
+  }
+  const Eigen::MatrixXd predicted = predict_response(observations_, {}, rows_);
+  const Components y = difference(y_, fit_.linear.offset);
+  const CrossValidation own = cross_validate(observations_, y, fit_.linear.columns, fit_.variances, rows_);
+  for (const Term& way : ways_) {
+    const std::string& name = way.effect->name;
+    const bool taken = already_in(way) || std::any_of(result.begin(), result.end(), [&](const Ranked& r) {
+                         return r.term.effect->name == name;
+                       });
+    if (taken) continue;
+    Observations other = observations_;
+    other.slopes.col(place) = respond(way, observations_, predicted).derivative[0][0];
+    const LossDifference difference_of_loss =
+        compare(cross_validate(other, y, fit_.linear.columns, fit_.variances, rows_), own);
+    const double error =
+        std::min(difference_of_loss.standard_error, difference_of_loss.expected_standard_error);
+    if (difference_of_loss.mean < 2 * error) result.push_back({.term = way});
+  }
+  return result;
+}
+
+}  // namespace tunnelrig
