@@ -117,6 +117,7 @@ FlownScenario fly_scenario(const Options& options, const PlaceAndPath& one, cons
     std::string warning;
     write_flown(folder, flown, task, warning);
     if (!warning.empty()) warn(warning);
+    flown.for_report = flight_for_report(flown, task, map.name);
     flown.logs.clear();
     flown.identification.clear();
   }
@@ -160,6 +161,11 @@ int run(const Options& options) {
     print_flown(flown.back());
   }
   if (programme) print_beside_thesis(flown);
+  if (!options.out.empty()) {
+    std::vector<std::string> shown;
+    for (const FlownScenario& one : flown) shown.push_back(one.for_report);
+    write_text(std::filesystem::path(options.out) / "flights.json", flights_json(shown, arguments()));
+  }
   if (!options.json.empty()) write_text(options.json, flown_json(flown, map.name, options.seed, programme));
   return kWell;
 }
@@ -199,7 +205,8 @@ void add_fly(CLI::App& app, Work& work) {
       ->capture_default_str();
   verb->add_option("--gains", options->gains, "File of gains; the frozen ones otherwise");
   verb->add_option("--json", options->json, "Write the comparison to this file");
-  verb->add_option("--out", options->out, "Folder for logs, residual tables and pictures");
+  verb->add_option("--out", options->out,
+                   "Folder for logs, residual tables, pictures, and flights.json for the report");
   verb->add_option("--tune", options->tune, "Tune the controllers and write their gains to this file");
   verb->add_option("--budget", options->budget, "With --tune: evaluations per controller")
       ->check(CLI::Range(10, 100000))

@@ -14,8 +14,16 @@ struct FlownScenario {
   std::string tunnel, scenario;
   std::vector<Comparison> controllers;
   std::vector<FlightLog> logs;                         // the first run of each controller; may be empty
+  std::string for_report;                              // flight_for_report
   std::vector<std::vector<FlightLog>> identification;  // by controller, for the residual tables; may be empty
 };
+
+/// What the report shows of a scenario (docs/report.md), as JSON: results, walls, reference, and the path of
+/// each controller's first run, ten points a second. Needs the logs.
+std::string flight_for_report(const FlownScenario& flown, const FlightTask& task, const std::string& map);
+
+/// flights.json of several such, for `tunnelrig report --flights`.
+std::string flights_json(const std::vector<std::string>& flights, const std::string& command);
 
 void print_flown(const FlownScenario& flown);
 

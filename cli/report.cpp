@@ -12,7 +12,7 @@ namespace tunnelrig::cli {
 namespace {
 
 struct Options {
-  std::string db, out, model, terms;
+  std::string db, out, model, terms, flights;
 };
 
 int run(const Options& options) {
@@ -21,7 +21,8 @@ int run(const Options& options) {
                                 .program_version = program_version(),
                                 .arguments = arguments(),
                                 .created_utc = now_utc(),
-                                .model = choose_model(file, options.model, options.terms)};
+                                .model = choose_model(file, options.model, options.terms),
+                                .flights = options.flights};
   ProgressBar bar("report");
   const ReportData data = report_data(file, settings, [&bar](std::size_t done, std::size_t total) {
     bar.show(static_cast<double>(done), static_cast<double>(total), fmt::format("run {} of {}", done, total));
@@ -44,9 +45,12 @@ void add_report(CLI::App& app, Work& work) {
   verb->footer(
       "The page needs no network and no other file; docs/report.md. A section that the campaign has no data "
       "for says why. Nothing is stored in the campaign file.\n\n"
-      "Example: tunnelrig report --db my.db --out report.html");
+      "Examples: tunnelrig report --db my.db --out report.html\n"
+      "          tunnelrig report --db my.db --out report.html --flights flights/flights.json");
   verb->add_option("--db", options->db, "Campaign file")->required();
   verb->add_option("--out", options->out, "The page (.html)")->required();
+  verb->add_option("--flights", options->flights,
+                   "flights.json of `tunnelrig fly --out`, for a section of its own");
   add_model_options(*verb, options->model, options->terms);
   verb->callback([options, &work] { work = [options] { return run(*options); }; });
 }

@@ -111,6 +111,7 @@ ReportData report_data(const CampaignFile& file, const ReportSettings& settings,
                                           : campaign_document(gather(file, settings, progress)));
   if (Json models = report::model_section(file); !models.empty())
     document["sections"]["model"] = std::move(models);
+  if (!settings.flights.empty()) document["sections"]["flights"] = report::flights_section(settings.flights);
   ReportData data;
   for (const auto& [name, section] : document["sections"].items()) {
     if (section.contains("absent")) data.absent.push_back({name, section["absent"].get<std::string>()});

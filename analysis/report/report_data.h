@@ -17,6 +17,7 @@ struct ReportSettings {
   std::string arguments;
   std::string created_utc;
   ModelChoice model;
+  std::string flights;  // the file of `tunnelrig fly` that the page is to show; empty: none
 };
 
 /// A section that a campaign has no data for, with the sentence that stands in its place.

@@ -78,6 +78,10 @@ Json findings_section(const Material& material);
 /// Every derived document of the file, oldest first.
 Json documents_section(const CampaignFile& file);
 
+/// flights.json of `tunnelrig fly --out`. Throws InputError naming file and rule for one that is not such a
+/// file.
+Json flights_section(const std::string& path);
+
 Json table_section(const ObservationTable& table, const TableReduction& reduction);
 
 }  // namespace tunnelrig::report

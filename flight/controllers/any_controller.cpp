@@ -86,17 +86,18 @@ GainTable parse_gains(std::string_view text, const std::string& file) {
         std::find_if(kKinds.begin(), kKinds.end(), [&](const auto& k) { return k.name == name; });
     if (kind != kKinds.end() && !kind->tuned)
       throw InputError::at(file, line_of(node), "{} has no gains of its own: {}", name, kind->description);
-    AnyController controller = [&] {
+    AnyController controller = [&, line = line_of(node)] {
       try {
         return AnyController(name, {}, {});
       } catch (const InputError& error) {
-        throw InputError::at(file, line_of(node), "{}", error.what());
+        throw InputError::at(file, line, "{}", error.what());
       }
     }();
     const auto known = controller.gain_list();
     for (const auto& [gain_key, value_node] : *table) {
-      const auto gain = std::find_if(known.begin(), known.end(),
-                                     [&](const NamedGain& g) { return g.name == gain_key.str(); });
+      const auto gain =
+          std::find_if(known.begin(), known.end(),
+                       [wanted = gain_key.str()](const NamedGain& g) { return g.name == wanted; });
       if (gain == known.end())
         throw InputError::at(file, line_of(value_node), "{} has no gain {}", name, gain_key.str());
       const auto value = value_node.value<double>();

@@ -1,8 +1,10 @@
-// The page: its sections in their order. One whose data are absent says why; only a model need not be there.
+// The page: its sections in their order. One whose data are absent says why; only a model and flights need not be
+// there.
 
 const campaignSections = [
   {id: 'model', title: 'What the model lacked: error before and after', build: modelSection},
   {id: 'maps', title: 'Disturbance maps', build: mapsSection},
+  {id: 'flights', title: 'Controllers flown in the map (simulated)', build: flightsSection},
   {id: 'locations', title: 'C_T by location', build: locationsSection},
   {id: 'open_space', title: 'The tunnel against open space', build: openSpaceSection},
   {id: 'uneven', title: 'Uneven thrust by location', build: unevenSection},
@@ -16,6 +18,7 @@ const campaignSections = [
 ];
 const tableSections = [
   {id: 'table', title: 'C_T against speed', build: tableSection},
+  {id: 'flights', title: 'Controllers flown in the map (simulated)', build: flightsSection},
   {id: 'provenance', title: 'Provenance', build: provenanceSection},
 ];
 

@@ -30,14 +30,25 @@ std::pair<std::string, int> output_of(const std::string& command) {
 
 bool has(const char* program) { return output_of(fmt::format("command -v {}", program)).second == 0; }
 
+/// Two points of a flight whose names are hostile.
+constexpr const char* kFlights =
+    R"({"format": "tunnelrig-flights/1", "command": "tunnelrig fly --out </script>",
+  "flights": [{"tunnel": "1.5", "scenario": "<b>hover", "map": "m.json", "position": "lidar",
+    "walls": [[-0.75, 0], [0.75, 0], [0.75, 1.5], [-0.75, 1.5]],
+    "reference": {"time_s": [0, 0.1], "y_m": [0, 0], "z_m": [0.75, 0.75]},
+    "controllers": [{"name": "</script><b>%{x}", "runs": 2, "rms_y_mm": 3.1, "rms_z_mm": 2, "max_y_mm": 9,
+      "max_z_mm": 8, "contacts": 0, "first_contact_s": null, "estimator_rms_mm": 1.5, "thrust_saturated_s": 0,
+      "path": {"y_m": [0, 0.01], "z_m": [0.75, 0.76]}}]}]})";
+
 struct Pages {
   test::TemporaryFolder folder;
   std::string names;
 
-  void add(const std::string& name) {
+  void add(const std::string& name, const std::string& flights = "") {
     const CampaignFile file(folder / (name + ".db"), CampaignFile::Access::kRead);
-    const ReportData data =
-        report_data(file, {.db = name + ".db", .program_version = "0", .arguments = "tunnelrig report"});
+    const ReportData data = report_data(
+        file,
+        {.db = name + ".db", .program_version = "0", .arguments = "tunnelrig report", .flights = flights});
     write_text(folder / (name + ".html"), render_report(data.json));
     names += fmt::format(" '{}'", (folder / (name + ".html")).string());
   }
@@ -60,7 +71,8 @@ TEST(ReportPage, OpensInABrowser) {
     file.add_document("model", {"0", "tunnelrig explain --adopt", "{}"},
                       nlohmann::json{{"explanation", test::explanation("confounded")}}.dump());
   }
-  pages.add("whole");  // once more, with a model
+  write_text(pages.folder / "flights.json", kFlights);
+  pages.add("whole", (pages.folder / "flights.json").string());  // once more, with a model and flights
   pages.campaign("one_rotor", {.raw_data = false, .rotors = 1});
   pages.campaign("one_run", {.raw_data = false, .open_space = false, .columns = 1, .rows = 1, .repeats = 1});
   test::make_table(pages.folder / "table.db");
