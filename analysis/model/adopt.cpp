@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 namespace tunnelrig {
@@ -43,6 +42,7 @@ const Covariate* covariate_of(const Observations& observations, const Curve& cur
 ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Observations& observations) {
   ModelCurve result{.covariate = curve.covariate,
                     .rotor = curve.rotor,
+                    .shape = curve.shape,
                     .low = curve.x.minCoeff(),
                     .high = curve.x.maxCoeff(),
                     .coefficients = {amplitude.data(), amplitude.data() + amplitude.size()}};
@@ -52,8 +52,8 @@ ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Obse
   for (Index k = 1; k <= amplitude.size(); ++k) {
     double sum = 0;
     for (Index row = 0; row < observations.rows(); ++row)
-      sum += std::cos(std::numbers::pi * static_cast<double>(k) * (covariate.at(row, rotor) - result.low) /
-                      (result.high - result.low));
+      sum += curve_column(curve.shape, static_cast<int>(k),
+                          curve_place(curve.shape, covariate.at(row, rotor), result.low, result.high));
     result.centre.push_back(sum / static_cast<double>(observations.rows()));
   }
   return result;

@@ -45,6 +45,7 @@ class Reader {
     if (found == json_.end()) fail("has no " + key);
     return *found;
   }
+  bool has(const std::string& key) const { return json_.contains(key); }
   Reader object(const std::string& key) const { return {at(key), where_ + "." + key}; }
   const Json& list(const std::string& key) const {
     if (!at(key).is_array()) fail("has a " + key + " that is no list");
@@ -119,9 +120,17 @@ ModelTerm term_of(const Reader& reader) {
   return term;
 }
 
+/// Versions that were stored before there were other shapes do not say it.
+CurveShape shape_of(const Reader& reader) {
+  if (!reader.has("shape")) return CurveShape::kWaves;
+  if (const auto shape = curve_shape(reader.text("shape"))) return *shape;
+  reader.fail("has a shape which this program does not know");
+}
+
 ModelCurve curve_of(const Reader& reader) {
   ModelCurve curve{.covariate = reader.text("covariate"),
                    .rotor = reader.rotor("rotor"),
+                   .shape = shape_of(reader),
                    .low = reader.number("low"),
                    .high = reader.number("high"),
                    .coefficients = reader.numbers("coefficients"),
@@ -200,6 +209,7 @@ std::string model_json(const ModelVersion& model) {
   for (const ModelCurve& curve : model.curves)
     json["curves"].push_back({{"covariate", curve.covariate},
                               {"rotor", rotor_json(curve.rotor)},
+                              {"shape", name_of(curve.shape)},
                               {"low", curve.low},
                               {"high", curve.high},
                               {"coefficients", curve.coefficients},

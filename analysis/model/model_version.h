@@ -2,6 +2,7 @@
 #pragma once
 
 #include "analysis/effects/effect.h"
+#include "analysis/residual/curve_basis.h"
 
 #include <limits>
 #include <string>
@@ -25,11 +26,12 @@ struct ModelTerm {
   std::string label() const;  // "creep of rotor 2"
 };
 
-/// A curve without a name: y changes by Σ a_k (cos(π k u) − centre_k), u from 0 at `low` to 1 at `high` and
+/// A curve without a name: y changes by Σ a_k (column_k(u) − centre_k), u from 0 at `low` to 1 at `high` and
 /// held there beyond.
 struct ModelCurve {
   std::string covariate;
   int rotor = -1;
+  CurveShape shape = CurveShape::kWaves;
   double low = 0, high = 1;
   std::vector<double> coefficients, centre;
 

@@ -48,6 +48,8 @@ class Search {
   std::pair<double, double> sum_of_squares(const Observations& observations, const JointFit& fit) const;
   /// A joint fit with one term more; theory's coefficient where the data do not speak against it.
   JointFit fit_with(Term term, double amplitude) const;
+  /// p of a likelihood ratio of one parameter of a fitted model: few rows are no large sample.
+  double ratio_p(double ratio, const JointFit& fit) const;
   void read_back_terms();
   /// With a new effect in, an older one may be explained better by another: it gives way.
   void swap_weaker();

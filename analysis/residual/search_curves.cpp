@@ -61,8 +61,7 @@ void Search::drop_what_a_curve_replaces() {
     if (result_.accepted[t].term.per_group) continue;  // stands in the baseline
     const JointFit without = fit_without(t);
     const double ratio = std::max(0.0, fit_.variances.log_likelihood - without.variances.log_likelihood);
-    const double z = std::sqrt(2 * ratio);
-    if (std::erfc(z / std::numbers::sqrt2) < kKeptP) continue;
+    if (ratio_p(ratio, fit_) < kKeptP && !at_bound(fit_, result_.accepted[t].term)) continue;
     result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
     fit_ = without;
     read_back_terms();
