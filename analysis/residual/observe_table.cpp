@@ -212,6 +212,10 @@ void set_other_axes(const TableSchema& schema, const std::string& baseline, Obse
   std::string_view quantity;
   for (const TableColumn& column : schema.covariates)
     if (column.column == baseline) quantity = unit_from_name(column.unit).quantity;
+  // A load that is the baseline need not be a covariate: the others' unit says what it is.
+  for (const TableColumn& column : schema.covariates)
+    if (quantity.empty() && unit_from_name(column.unit).quantity == unit_from_name("N").quantity)
+      quantity = unit_from_name(column.unit).quantity;
   for (const TableColumn& column : schema.covariates)
     if (column.column != baseline && !quantity.empty() && unit_from_name(column.unit).quantity == quantity)
       result.other_axes.push_back(column.meaning.empty() ? column.column : column.meaning);
@@ -256,7 +260,6 @@ void set_baseline(const Source& source, const ObservationChoice& choice, Observa
     result.slopes(r, 0) = kind == "power" ? std::log(x) : x;
   }
   if (kind == "linear") set_other_axes(source.table.schema, column, result);
-  std::erase_if(result.covariates, [&](const Covariate& covariate) { return covariate.name == column; });
 }
 
 }  // namespace

@@ -16,12 +16,14 @@ namespace {
 using Eigen::Index;
 
 constexpr double kKnownPhysicsWeight = 10;  // theory gives the coefficient: a prior that others lack
-constexpr double kTheoryRefused = 0.05;     // p at which the data speak against theory's coefficient
-constexpr double kSwapDecades = 0.7;        // another explains that much better: it takes the place
+constexpr double kRareWeight = 10;       // stiff blades do not flex, while a Reynolds number all blades have
+constexpr double kTheoryRefused = 0.05;  // p at which the data speak against theory's coefficient
+constexpr double kSwapDecades = 0.7;     // another explains that much better: it takes the place
 
 double prior_weight(const Term& term, std::size_t ways) {
   const Effect& effect = *term.effect;
   double weight = effect.theory() ? kKnownPhysicsWeight : 1;
+  if (effect.name == "blade_flex") weight /= kRareWeight;
   if (effect.scope == EffectScope::kRotor && term.rotor >= 0) weight /= 4;
   if (effect.scope == EffectScope::kPair) weight /= 12;
   if (effect.has_change_point()) weight /= std::max<double>(1, static_cast<double>(ways));
