@@ -179,8 +179,7 @@ class Forward {
       const double x = std::clamp(curve_covariates_[k]->at(row, channel), curve.low, curve.high);
       const double u = curve_place(curve.shape, x, curve.low, curve.high);
       for (std::size_t b = 0; b < curve.coefficients.size(); ++b)
-        sum += parameters(first_curve_[k] + static_cast<Index>(b)) *
-               (curve_column(curve.shape, static_cast<int>(b) + 1, u) - curve.centre[b]);
+        sum += parameters(first_curve_[k] + static_cast<Index>(b)) * curve.column(b, u);
     }
     return sum;
   }

@@ -134,10 +134,13 @@ ModelCurve curve_of(const Reader& reader) {
                    .low = reader.number("low"),
                    .high = reader.number("high"),
                    .coefficients = reader.numbers("coefficients"),
-                   .centre = reader.numbers("centre")};
+                   .centre = reader.numbers("centre"),
+                   .tilt = reader.has("tilt") ? reader.numbers("tilt") : std::vector<double>()};
   if (!(curve.high > curve.low)) reader.fail("has no range: high is not above low");
   if (curve.coefficients.size() != curve.centre.size())
     reader.fail("has not as many coefficients as values of centre");
+  if (!curve.tilt.empty() && curve.tilt.size() != curve.coefficients.size())
+    reader.fail("has not as many coefficients as values of tilt");
   return curve;
 }
 
@@ -168,6 +171,11 @@ std::string ModelTerm::label() const {
   if (other >= 0) text += fmt::format(" from rotor {}", other + 1);
   if (rotor >= 0) text += fmt::format(" {} rotor {}", other >= 0 ? "to" : "of", rotor + 1);
   return text;
+}
+
+double ModelCurve::column(std::size_t k, double u) const {
+  return curve_column(shape, static_cast<int>(k) + 1, u) - (tilt.empty() ? 0 : tilt[k] * (2 * u - 1)) -
+         centre[k];
 }
 
 std::string ModelCurve::label() const {
@@ -213,7 +221,8 @@ std::string model_json(const ModelVersion& model) {
                               {"low", curve.low},
                               {"high", curve.high},
                               {"coefficients", curve.coefficients},
-                              {"centre", curve.centre}});
+                              {"centre", curve.centre},
+                              {"tilt", curve.tilt}});
   for (Index i = 0; i < model.covariance.rows(); ++i) {
     Json row = Json::array();
     for (Index j = 0; j < model.covariance.cols(); ++j) row.push_back(model.covariance(i, j));

@@ -81,8 +81,11 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
     const int most = different_values(covariate, rows) / 3;
     const auto add = [&](CurveShape shape, int count) {
       for (const int rotor : rotors)
-        curves.push_back({reported_name(covariate.name), rotor, shape,
-                          columns_over(observations, covariate, rotor, shape, count), covariate.value});
+        curves.push_back({.covariate = reported_name(covariate.name),
+                          .rotor = rotor,
+                          .shape = shape,
+                          .columns = columns_over(observations, covariate, rotor, shape, count),
+                          .x = covariate.value});
     };
     if (most >= 1) add(parabola_over(observations, covariate), 1);
     for (const int count : kBends)
@@ -90,8 +93,36 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
   }
   if (!observations.shape.empty())
     for (const int rotor : rotors)
-      curves.push_back({"time_in_run", rotor, CurveShape::kWaves, course(observations, rotor), {}});
+      curves.push_back(
+          {.covariate = "time_in_run", .rotor = rotor, .columns = course(observations, rotor), .x = {}});
   return curves;
+}
+
+bool is_over(const Curve& curve, const std::vector<std::string>& covariates) {
+  return std::any_of(covariates.begin(), covariates.end(),
+                     [&](const std::string& name) { return reported_name(name) == curve.covariate; });
+}
+
+Curve without_trend(const Curve& curve, const std::vector<int>& rows) {
+  Curve result = curve;
+  if (curve.x.size() == 0) return result;
+  const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
+  for (Components& column : result.columns) {
+    const bool own = column[0].cols() > 1 && curve.rotor >= 0;
+    MatrixXd straight = MatrixXd::Zero(column[0].rows(), column[0].cols());
+    for (Index row = 0; row < straight.rows(); ++row)
+      for (Index c = 0; c < straight.cols(); ++c)
+        if (!own || c == curve.rotor)
+          straight(row, c) =
+              2 * curve_place(curve.shape, curve.x(row, curve.x.cols() > 1 ? c : 0), low, high) - 1;
+    const Index first = own ? curve.rotor : 0, channels = own ? 1 : straight.cols();
+    const MatrixXd w = straight.middleCols(first, channels)(rows, Eigen::all),
+                   y = column[0].middleCols(first, channels)(rows, Eigen::all);
+    const auto centred = w.array() - w.mean();
+    result.tilt.push_back((centred * y.array()).sum() / centred.square().sum());
+    column[0] -= result.tilt.back() * straight;
+  }
+  return result;
 }
 
 Candidate as_candidate(const Curve& curve) { return {.columns = curve.columns, .sign = 0, .weight = 1}; }

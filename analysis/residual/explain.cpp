@@ -38,6 +38,19 @@ HeldOutErrors score(const Observations& observations, const JointFit& fit, const
   return predict_held_out(observations, y, fit.linear.columns, variances, fit_rows, test_rows);
 }
 
+/// The named terms as they were found beside the curves: fitted without them, they would take up what the
+/// curves describe.
+JointFit without_curves(const Attribution& found, const std::vector<int>& rows) {
+  JointFit fit = found.final;
+  fit.model.curves.clear();
+  const Observations& observations = found.observations;
+  fit.linear = linearise(observations, fit.model, predict_response(observations, fit.model, rows));
+  fit.linear.columns.clear();
+  fit.variances = CandidateScan(MixedModel(observations, rows), {}, {})
+                      .null_fit(difference(response_components(observations), fit.linear.offset));
+  return fit;
+}
+
 std::string verdict_of(const Explanation& explanation) {
   if (explanation.adopted.empty()) return explanation.unknown.empty() ? "no_structure" : "unknown";
   if (!explanation.unknown.empty()) return "partly_explained";
@@ -129,11 +142,8 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   if (settings.empirical)
     for (const FoundCurve& found_curve : found.curves)
       explanation.empirical.push_back(found_curve.curve.label());
-  if (!found.curves.empty() && !settings.empirical) {
-    MeanModel terms = found.final.model;
-    terms.curves.clear();
-    named = found.accepted.empty() ? found.baseline : fit_jointly(found.observations, terms, seal.open);
-  }
+  if (!found.curves.empty() && !settings.empirical)
+    named = found.accepted.empty() ? found.baseline : without_curves(found, seal.open);
   const HeldOutErrors before = score(observations, found.baseline, named.variances, seal.open, seal.sealed);
   const Observations& wide = found.observations;
   const HeldOutErrors after = score(wide, named, named.variances, seal.open, seal.sealed);

@@ -232,6 +232,16 @@ void set_groups_within_blocks(Observations& result) {
                                             [](const auto& g) { return g.second.size() == 1; });
 }
 
+/// What the baseline is over is a condition as well: a curve over it shows where a line or a power law is
+/// wrong.
+void keep_as_covariate(const Source& source, const std::string& column, Observations& result) {
+  for (const TableColumn& covariate : source.table.schema.covariates)
+    if (covariate.column == column) return;
+  Covariate covariate{column, MatrixXd(source.count(), 1)};
+  for (Index r = 0; r < source.count(); ++r) covariate.value(r, 0) = source.cell(r, column);
+  if (result.find(column) == nullptr) result.covariates.push_back(std::move(covariate));
+}
+
 /// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
 void set_baseline(const Source& source, const ObservationChoice& choice, Observations& result) {
   result.baseline = choice.baseline.empty() ? "constant" : choice.baseline;
@@ -259,6 +269,7 @@ void set_baseline(const Source& source, const ObservationChoice& choice, Observa
                            result.baseline, column, std::isnan(x) ? "empty" : "not above 0");
     result.slopes(r, 0) = kind == "power" ? std::log(x) : x;
   }
+  keep_as_covariate(source, column, result);
   if (kind == "linear") set_other_axes(source.table.schema, column, result);
 }
 

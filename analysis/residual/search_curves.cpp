@@ -25,17 +25,21 @@ void Search::add_curves() {
 bool Search::add_best_curve() {
   settings_.progress("looking for structure without a name");
   Scan scan;
-  std::vector<std::size_t> tried;
+  std::vector<Curve> tried;
   for (std::size_t c = 0; c < curves_.size(); ++c) {
     const bool in = std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
       return found.curve.covariate == curves_[c].covariate &&
              (found.curve.rotor < 0 || found.curve.rotor == curves_[c].rotor);
     });
     if (in) continue;
-    Candidate candidate = as_candidate(curves_[c]);
+    const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
+      return is_over(curves_[c], a.term.effect->covariates);
+    });
+    Curve curve = named ? without_trend(curves_[c], rows_) : curves_[c];
+    Candidate candidate = as_candidate(curve);
     if (!can_be_seen(candidate)) continue;
     scan.candidates.push_back(std::move(candidate));
-    tried.push_back(c);
+    tried.push_back(std::move(curve));
   }
   if (tried.empty()) return false;
   rank(fit_, scan);
@@ -45,12 +49,12 @@ bool Search::add_best_curve() {
   Round round;
   round.observed = scan.fits[best].evidence;
   round.null_maxima = maxima.values();
-  round.outcome = fmt::format("p = {:.3g} for {}", p, curves_[tried[best]].label());
+  round.outcome = fmt::format("p = {:.3g} for {}", p, tried[best].label());
   result_.curve_rounds.push_back(std::move(round));
   if (p > settings_.alpha) return false;
-  result_.curves.push_back({curves_[tried[best]], p});
+  result_.curves.push_back({tried[best], p});
   MeanModel model = fit_.model;
-  model.curves.push_back(curves_[tried[best]]);
+  model.curves.push_back(tried[best]);
   fit_ = fit_jointly(observations_, model, rows_);
   read_back_terms();
   return true;

@@ -161,7 +161,8 @@ TEST(ModelVersion, IsReadAsItWasWritten) {
        .low = 1,
        .high = 2,
        .coefficients = {2},
-       .centre = {0.3}}};
+       .centre = {0.3},
+       .tilt = {0.1}}};
   model.covariance = 0.5 * Eigen::MatrixXd::Identity(6, 6);
   model.covariance(1, 0) = model.covariance(0, 1) = 1.0 / 3;
   const ModelVersion read = model_from_json(model_json(model), "m");
