@@ -64,6 +64,11 @@ class Search {
   bool add_best_curve();
   /// A name whose work a curve does as well was the wrong name for that curve.
   void drop_what_a_curve_replaces();
+  /// Whether the newest curve, over a covariate of this effect, does more than the effect: then the effect
+  /// was only the curve's straight part.
+  bool outshone_by_curve(const Term& term) const;
+  /// The newest curve with its straight part, which no name takes any more.
+  void restore_trend();
   bool session_scatter_is_large() const;
 
   // what cannot be told apart: search_rivals.cpp

@@ -63,13 +63,40 @@ bool Search::add_best_curve() {
 void Search::drop_what_a_curve_replaces() {
   for (std::size_t t = result_.accepted.size(); t-- > 0;) {
     if (result_.accepted[t].term.per_group) continue;  // stands in the baseline
+    const bool outshone = outshone_by_curve(result_.accepted[t].term);
     const JointFit without = fit_without(t);
     const double ratio = std::max(0.0, fit_.variances.log_likelihood - without.variances.log_likelihood);
-    if (ratio_p(ratio, fit_) < kKeptP && !at_bound(fit_, result_.accepted[t].term)) continue;
+    if (ratio_p(ratio, fit_) < kKeptP && !at_bound(fit_, result_.accepted[t].term) && !outshone) continue;
     result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
     fit_ = without;
     read_back_terms();
+    if (outshone) restore_trend();
   }
+}
+
+bool Search::outshone_by_curve(const Term& term) const {
+  const Curve& curve = result_.curves.back().curve;
+  if (curve.tilt.empty() || !is_over(curve, term.effect->covariates)) return false;
+  const AmplitudeFit fit = fit_amplitudes(observations_, difference(y_, fit_.linear.offset),
+                                          fit_.linear.columns, fit_.variances, rows_);
+  const auto columns = static_cast<Eigen::Index>(curve.columns.size());
+  const Eigen::VectorXd amplitude = fit.amplitude.tail(columns);
+  Eigen::MatrixXd drawn = Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels());
+  for (Eigen::Index k = 0; k < columns; ++k)
+    drawn += amplitude(k) * curve.columns[static_cast<std::size_t>(k)][0];
+  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+  return rms_of(drawn) > rms_of(respond(term, observations_, predicted).value[0]);
+}
+
+void Search::restore_trend() {
+  Curve& curve = result_.curves.back().curve;
+  for (const Curve& plain : curves_)
+    if (plain.covariate == curve.covariate && plain.rotor == curve.rotor && plain.shape == curve.shape &&
+        plain.columns.size() == curve.columns.size())
+      curve = plain;
+  fit_.model.curves.back() = curve;
+  fit_ = fit_jointly(observations_, fit_.model, rows_);
+  read_back_terms();
 }
 
 bool Search::session_scatter_is_large() const {
