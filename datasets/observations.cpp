@@ -265,8 +265,9 @@ ObservationTable read_observations(const Sheet& sheet, const TableSchema& schema
 
 ObservationTable observations_of(const CampaignFile& file) {
   const auto toml = file.text("table.toml");
-  const auto sheet = file.sheet("observations");
+  auto sheet = file.sheet("observations");
   if (!toml || !sheet) throw InputError::in(file.path().string(), "holds no table of observations");
+  if (const auto source = file.text("table.source")) sheet->file = *source;
   return read_observations(*sheet, parse_table_schema(*toml, "table.toml"));
 }
 
@@ -275,6 +276,7 @@ std::size_t store_table(const Sheet& sheet, const TableSchema& schema, const std
   const ObservationTable table = read_observations(sheet, schema);
   StagedCampaign staged(file, replace);
   staged.file().set_text("table.toml", schema.toml);
+  staged.file().set_text("table.source", std::filesystem::path(sheet.file).filename().string());
   staged.file().set_sheet("observations", sheet);
   staged.publish();
   return table.rows.size();

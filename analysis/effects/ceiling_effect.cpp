@@ -1,6 +1,7 @@
 // Flow towards the rotor is throttled by the ceiling, which lowers the pressure above it.
 #include "analysis/effects/effect.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tunnelrig::effects {
@@ -9,7 +10,7 @@ namespace {
 struct CeilingImage {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
-    const double half = 0.25 / s.x[0];
+    const double half = 0.25 / std::max(s.x[0], kNearestImage_R);
     return force / (1.0 - p[0] * (half * half));
   }
 };
@@ -29,9 +30,9 @@ std::vector<Effect> ceiling_effect() {
       make_effect<CeilingImage>({
           .name = "ceiling_effect",
           .form = "image",
-          .formula = "F / (1 − a (R / 4z)²)",
+          .formula = "F / (1 − a (R / 4z)²), z ≥ R/2",
           .physics = "image of the inflow in the ceiling (Sanchez-Cuevas et al. 2017)",
-          .parameters = {{"strength", "1", 0, 9}},
+          .parameters = {{"strength", "1", 0, 3}},
           .covariates = {"ceiling_distance_R"},
           .scope = EffectScope::kShared,
           .sign_rule = "more thrust near the ceiling",

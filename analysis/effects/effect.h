@@ -87,6 +87,10 @@ Effect make_effect(Effect description) {
 /// 2 s to half an hour, five values a decade: time constants that a run or a session can show.
 std::vector<double> time_constants_s();
 
+/// Images in ground or ceiling are of a rotor that is far away compared with its radius: nearer than this the
+/// formula is held, which also keeps the strongest of images clear of its pole.
+inline constexpr double kNearestImage_R = 0.5;
+
 /// Every candidate of this folder, forms of one effect next to each other.
 const std::vector<Effect>& all_effects();
 

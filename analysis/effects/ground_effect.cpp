@@ -1,6 +1,7 @@
 // The wake is held up by the ground.
 #include "analysis/effects/effect.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tunnelrig::effects {
@@ -9,7 +10,7 @@ namespace {
 struct CheesemanBennett {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
-    const double half = 0.25 / s.x[0];
+    const double half = 0.25 / std::max(s.x[0], kNearestImage_R);
     return force / (1.0 - p[0] * (half * half));
   }
 };
@@ -29,10 +30,10 @@ std::vector<Effect> ground_effect() {
       make_effect<CheesemanBennett>({
           .name = "ground_effect",
           .form = "image",
-          .formula = "F / (1 − a (R / 4z)²)",
+          .formula = "F / (1 − a (R / 4z)²), z ≥ R/2",
           .physics = "image of the wake in the ground: a = 1 for one rotor (Cheeseman & Bennett 1955), "
                      "larger for several (Sanchez-Cuevas et al. 2017)",
-          .parameters = {{"strength", "1", 0, 9, ParameterRole::kAmplitude, {}, 1.0}},
+          .parameters = {{"strength", "1", 0, 3, ParameterRole::kAmplitude, {}, 1.0}},
           .covariates = {"ground_distance_R"},
           .scope = EffectScope::kShared,
           .sign_rule = "more thrust near the ground",

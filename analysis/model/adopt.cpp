@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 namespace tunnelrig {
@@ -43,18 +42,20 @@ const Covariate* covariate_of(const Observations& observations, const Curve& cur
 ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Observations& observations) {
   ModelCurve result{.covariate = curve.covariate,
                     .rotor = curve.rotor,
+                    .shape = curve.shape,
                     .low = curve.x.minCoeff(),
                     .high = curve.x.maxCoeff(),
-                    .coefficients = {amplitude.data(), amplitude.data() + amplitude.size()}};
+                    .coefficients = {amplitude.data(), amplitude.data() + amplitude.size()},
+                    .tilt = curve.tilt};
   // The mean over the runs is the baseline's: without it the curve would shift every coefficient.
   const Covariate& covariate = *covariate_of(observations, curve);
   const Index rotor = std::max(curve.rotor, 0);
-  for (Index k = 1; k <= amplitude.size(); ++k) {
+  result.centre.assign(result.coefficients.size(), 0);
+  for (std::size_t k = 0; k < result.centre.size(); ++k) {
     double sum = 0;
     for (Index row = 0; row < observations.rows(); ++row)
-      sum += std::cos(std::numbers::pi * static_cast<double>(k) * (covariate.at(row, rotor) - result.low) /
-                      (result.high - result.low));
-    result.centre.push_back(sum / static_cast<double>(observations.rows()));
+      sum += result.column(k, curve_place(curve.shape, covariate.at(row, rotor), result.low, result.high));
+    result.centre[k] = sum / static_cast<double>(observations.rows());
   }
   return result;
 }

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <numeric>
 #include <optional>
 
@@ -177,11 +176,10 @@ class Forward {
     for (std::size_t k = 0; k < model_.curves.size(); ++k) {
       const ModelCurve& curve = model_.curves[k];
       if (curve.rotor >= 0 && channel != curve.rotor) continue;
-      const double u = std::clamp(
-          (curve_covariates_[k]->at(row, channel) - curve.low) / (curve.high - curve.low), 0.0, 1.0);
+      const double x = std::clamp(curve_covariates_[k]->at(row, channel), curve.low, curve.high);
+      const double u = curve_place(curve.shape, x, curve.low, curve.high);
       for (std::size_t b = 0; b < curve.coefficients.size(); ++b)
-        sum += parameters(first_curve_[k] + static_cast<Index>(b)) *
-               (std::cos(std::numbers::pi * static_cast<double>(b + 1) * u) - curve.centre[b]);
+        sum += parameters(first_curve_[k] + static_cast<Index>(b)) * curve.column(b, u);
     }
     return sum;
   }

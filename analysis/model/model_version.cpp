@@ -45,6 +45,7 @@ class Reader {
     if (found == json_.end()) fail("has no " + key);
     return *found;
   }
+  bool has(const std::string& key) const { return json_.contains(key); }
   Reader object(const std::string& key) const { return {at(key), where_ + "." + key}; }
   const Json& list(const std::string& key) const {
     if (!at(key).is_array()) fail("has a " + key + " that is no list");
@@ -119,16 +120,27 @@ ModelTerm term_of(const Reader& reader) {
   return term;
 }
 
+/// Versions that were stored before there were other shapes do not say it.
+CurveShape shape_of(const Reader& reader) {
+  if (!reader.has("shape")) return CurveShape::kWaves;
+  if (const auto shape = curve_shape(reader.text("shape"))) return *shape;
+  reader.fail("has a shape which this program does not know");
+}
+
 ModelCurve curve_of(const Reader& reader) {
   ModelCurve curve{.covariate = reader.text("covariate"),
                    .rotor = reader.rotor("rotor"),
+                   .shape = shape_of(reader),
                    .low = reader.number("low"),
                    .high = reader.number("high"),
                    .coefficients = reader.numbers("coefficients"),
-                   .centre = reader.numbers("centre")};
+                   .centre = reader.numbers("centre"),
+                   .tilt = reader.has("tilt") ? reader.numbers("tilt") : std::vector<double>()};
   if (!(curve.high > curve.low)) reader.fail("has no range: high is not above low");
   if (curve.coefficients.size() != curve.centre.size())
     reader.fail("has not as many coefficients as values of centre");
+  if (!curve.tilt.empty() && curve.tilt.size() != curve.coefficients.size())
+    reader.fail("has not as many coefficients as values of tilt");
   return curve;
 }
 
@@ -159,6 +171,11 @@ std::string ModelTerm::label() const {
   if (other >= 0) text += fmt::format(" from rotor {}", other + 1);
   if (rotor >= 0) text += fmt::format(" {} rotor {}", other >= 0 ? "to" : "of", rotor + 1);
   return text;
+}
+
+double ModelCurve::column(std::size_t k, double u) const {
+  return curve_column(shape, static_cast<int>(k) + 1, u) - (tilt.empty() ? 0 : tilt[k] * (2 * u - 1)) -
+         centre[k];
 }
 
 std::string ModelCurve::label() const {
@@ -200,10 +217,12 @@ std::string model_json(const ModelVersion& model) {
   for (const ModelCurve& curve : model.curves)
     json["curves"].push_back({{"covariate", curve.covariate},
                               {"rotor", rotor_json(curve.rotor)},
+                              {"shape", name_of(curve.shape)},
                               {"low", curve.low},
                               {"high", curve.high},
                               {"coefficients", curve.coefficients},
-                              {"centre", curve.centre}});
+                              {"centre", curve.centre},
+                              {"tilt", curve.tilt}});
   for (Index i = 0; i < model.covariance.rows(); ++i) {
     Json row = Json::array();
     for (Index j = 0; j < model.covariance.cols(); ++j) row.push_back(model.covariance(i, j));

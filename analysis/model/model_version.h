@@ -2,6 +2,7 @@
 #pragma once
 
 #include "analysis/effects/effect.h"
+#include "analysis/residual/curve_basis.h"
 
 #include <limits>
 #include <string>
@@ -25,15 +26,18 @@ struct ModelTerm {
   std::string label() const;  // "creep of rotor 2"
 };
 
-/// A curve without a name: y changes by Σ a_k (cos(π k u) − centre_k), u from 0 at `low` to 1 at `high` and
-/// held there beyond.
+/// A curve without a name: y changes by Σ a_k (column_k(u) − tilt_k (2u − 1) − centre_k), u from 0 at `low`
+/// to 1 at `high` and held there beyond.
 struct ModelCurve {
   std::string covariate;
   int rotor = -1;
+  CurveShape shape = CurveShape::kWaves;
   double low = 0, high = 1;
   std::vector<double> coefficients, centre;
+  std::vector<double> tilt = {};  // empty: none
 
-  std::string label() const;  // "curve over relative_humidity (empirical)"
+  double column(std::size_t k, double u) const;  // of the k-th coefficient, from 0, with tilt and centre
+  std::string label() const;                     // "curve over relative_humidity (empirical)"
 };
 
 struct ModelVersion {

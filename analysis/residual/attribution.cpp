@@ -1,5 +1,9 @@
 #include "analysis/residual/search.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 namespace tunnelrig {
 
 Search::Search(const Observations& observations, const std::vector<int>& rows,
@@ -17,6 +21,7 @@ Search::Search(const Observations& observations, const std::vector<int>& rows,
 Attribution Search::run() {
   result_.baseline = fit_jointly(observations_, {}, rows_);
   fit_ = result_.baseline;
+  result_.detectable_sigma = detectable_by_one(*mixed_, fit_.variances, settings_.alpha);
   add_effects();
   add_curves();
   find_confounded();
@@ -34,6 +39,19 @@ std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Obse
     for (Term& way : ways_to_try(*effect, observations, rows)) ways.push_back(std::move(way));
   }
   return ways;
+}
+
+double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha) {
+  const double variance = std::pow(variances.sigma[0], 2) * (1 + kRatios[variances.ratio[0]]);
+  const double values =
+      static_cast<double>(std::max<Eigen::Index>(mixed.dof(0), 1) * mixed.mode_matrix().cols());
+  return deviates(-std::log10(alpha)) * std::sqrt(variance / values);
+}
+
+double deviates(double evidence) {
+  double z = 0;
+  while (-std::log10(std::erfc(z / std::numbers::sqrt2)) < evidence) z += 0.01;
+  return z + 0.84;
 }
 
 Attribution attribute(const Observations& observations, const std::vector<int>& rows,

@@ -66,6 +66,14 @@ struct Attribution {
 std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,
                            const std::vector<int>& rows);
 
+/// Standard errors that an effect must be of to reach an evidence four times in five: −log10 p of a two-sided
+/// normal deviate, and 0.84.
+double deviates(double evidence);
+
+/// Where no candidate can be tried: rms, in y, of a single effect on all rotors alike that varies from run to
+/// run, and would be found at 80 % power if it were the only candidate.
+double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha);
+
 Attribution attribute(const Observations& observations, const std::vector<int>& rows,
                       const std::vector<const Effect*>& effects, const SearchSettings& settings);
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <set>
 
 #include <fmt/format.h>
@@ -22,9 +21,8 @@ Components nothing(const Observations& observations) {
                     MatrixXd::Zero(observations.rows(), observations.channels()));
 }
 
-/// cos(π k u), u = 0 … 1 over the covariate's range: bends of ever shorter length.
-std::vector<Components> bends(const Observations& observations, const Covariate& covariate, int rotor,
-                              int count) {
+std::vector<Components> columns_over(const Observations& observations, const Covariate& covariate, int rotor,
+                                     CurveShape shape, int count) {
   const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff();
   std::vector<Components> columns;
   for (int k = 1; k <= count; ++k) {
@@ -33,7 +31,7 @@ std::vector<Components> bends(const Observations& observations, const Covariate&
       for (Index channel = 0; channel < observations.channels(); ++channel)
         if (rotor < 0 || channel == rotor)
           columns.back()[0](row, channel) =
-              std::cos(std::numbers::pi * k * (covariate.at(row, channel) - low) / (high - low));
+              curve_column(shape, k, curve_place(shape, covariate.at(row, channel), low, high));
   }
   return columns;
 }
@@ -46,6 +44,13 @@ std::vector<Components> course(const Observations& observations, int rotor) {
       if (rotor < 0 || channel == rotor) columns.back()[j].col(channel).setConstant(1);
   }
   return columns;
+}
+
+/// Over the logarithm where the covariate is a ratio: then a power law is what is straight.
+CurveShape parabola_over(const Observations& observations, const Covariate& covariate) {
+  const bool ratio = observations.multiplicative && !covariate.derived && !covariate.name.ends_with("_C") &&
+                     covariate.value.minCoeff() > 0;
+  return ratio ? CurveShape::kLogParabola : CurveShape::kParabola;
 }
 
 int different_values(const Covariate& covariate, const std::vector<int>& rows) {
@@ -74,16 +79,50 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
     if (observations.not_usable.contains(covariate.name) || covariate.value.array().isNaN().any()) continue;
     if (!(covariate.value.maxCoeff() > covariate.value.minCoeff())) continue;
     const int most = different_values(covariate, rows) / 3;
-    for (const int count : kBends) {
-      if (count > most) continue;
+    const auto add = [&](CurveShape shape, int count) {
       for (const int rotor : rotors)
-        curves.push_back({reported_name(covariate.name), rotor, bends(observations, covariate, rotor, count),
-                          covariate.value});
-    }
+        curves.push_back({.covariate = reported_name(covariate.name),
+                          .rotor = rotor,
+                          .shape = shape,
+                          .columns = columns_over(observations, covariate, rotor, shape, count),
+                          .x = covariate.value});
+    };
+    if (most >= 1) add(parabola_over(observations, covariate), 1);
+    for (const int count : kBends)
+      if (count <= most) add(CurveShape::kWaves, count);
   }
   if (!observations.shape.empty())
-    for (const int rotor : rotors) curves.push_back({"time_in_run", rotor, course(observations, rotor), {}});
+    for (const int rotor : rotors)
+      curves.push_back(
+          {.covariate = "time_in_run", .rotor = rotor, .columns = course(observations, rotor), .x = {}});
   return curves;
+}
+
+bool is_over(const Curve& curve, const std::vector<std::string>& covariates) {
+  return std::any_of(covariates.begin(), covariates.end(),
+                     [&](const std::string& name) { return reported_name(name) == curve.covariate; });
+}
+
+Curve without_trend(const Curve& curve, const std::vector<int>& rows) {
+  Curve result = curve;
+  if (curve.x.size() == 0) return result;
+  const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
+  for (Components& column : result.columns) {
+    const bool own = column[0].cols() > 1 && curve.rotor >= 0;
+    MatrixXd straight = MatrixXd::Zero(column[0].rows(), column[0].cols());
+    for (Index row = 0; row < straight.rows(); ++row)
+      for (Index c = 0; c < straight.cols(); ++c)
+        if (!own || c == curve.rotor)
+          straight(row, c) =
+              2 * curve_place(curve.shape, curve.x(row, curve.x.cols() > 1 ? c : 0), low, high) - 1;
+    const Index first = own ? curve.rotor : 0, channels = own ? 1 : straight.cols();
+    const MatrixXd w = straight.middleCols(first, channels)(rows, Eigen::all),
+                   y = column[0].middleCols(first, channels)(rows, Eigen::all);
+    const auto centred = w.array() - w.mean();
+    result.tilt.push_back((centred * y.array()).sum() / centred.square().sum());
+    column[0] -= result.tilt.back() * straight;
+  }
+  return result;
 }
 
 Candidate as_candidate(const Curve& curve) { return {.columns = curve.columns, .sign = 0, .weight = 1}; }

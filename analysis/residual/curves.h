@@ -2,6 +2,7 @@
 // within them.
 #pragma once
 
+#include "analysis/residual/curve_basis.h"
 #include "analysis/residual/likelihood.h"
 
 #include <string>
@@ -14,15 +15,23 @@ struct Curve {
   std::string
       covariate;  // a column of the sheet, or "run_order", "time_in_run", "start_utc" (hours in the session)
   int rotor = -1;
+  CurveShape shape = CurveShape::kWaves;
   std::vector<Components> columns;
-  Eigen::MatrixXd x;  // n × 1 or n × c: what it is drawn against; empty for time_in_run
+  std::vector<double> tilt = {};  // of each column: what was taken out of it of 2u − 1; empty: nothing
+  Eigen::MatrixXd x;              // n × 1 or n × c: what it is drawn against; empty for time_in_run
 
   std::string label() const;
 };
 
-/// Curves over everything that is known of the runs. `rows` decide how many bends a covariate can show: one
-/// for every three different values, at most six.
+/// Curves over everything that is known of the runs: a parabola beside whatever trend has a name, and waves.
+/// `rows` decide how many bends a covariate can show: one for every three different values, at most six.
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows);
+
+/// The same without what is straight: beside a named effect of the same covariate, whose work that is.
+Curve without_trend(const Curve& curve, const std::vector<int>& rows);
+
+/// Whether one of these covariates is what the curve is over.
+bool is_over(const Curve& curve, const std::vector<std::string>& covariates);
 
 Candidate as_candidate(const Curve& curve);
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <numeric>
 
 namespace tunnelrig {
@@ -35,10 +34,15 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   for (int p = 0; p < kPoints; ++p) {
     const double u = static_cast<double>(p) / (kPoints - 1);
     VectorXd basis(k);
-    for (Index b = 0; b < k; ++b) basis(b) = std::cos(std::numbers::pi * static_cast<double>(b + 1) * u);
+    const double x = low + u * (high - low);
+    const double place = within ? u : curve_place(found.curve.shape, x, low, high);
+    for (Index b = 0; b < k; ++b)
+      basis(b) =
+          curve_column(found.curve.shape, static_cast<int>(b) + 1, place) -
+          (found.curve.tilt.empty() ? 0 : found.curve.tilt[static_cast<std::size_t>(b)] * (2 * place - 1));
     const double value = scale * basis.dot(amplitude),
                  half = 1.96 * scale * std::sqrt(std::max(0.0, basis.dot(covariance * basis)));
-    result.shape.push_back({low + u * (high - low), value, value - half, value + half});
+    result.shape.push_back({x, value, value - half, value + half});
     mean += value / kPoints;
   }
   double lowest = 1e300, highest = -1e300;

@@ -21,6 +21,11 @@ MatrixXd residuals(const Observations& observations, const JointFit& fit, const 
   return predict_held_out(observations, y, fit.linear.columns, fit.variances, rows, rows).error;
 }
 
+/// Response per unit of y.
+double scale_of(const Observations& observations) {
+  return observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
+}
+
 double rms(const MatrixXd& errors) {
   const auto missing = errors.array().isNaN();
   const Index count = errors.size() - missing.count();
@@ -33,6 +38,19 @@ HeldOutErrors score(const Observations& observations, const JointFit& fit, const
   return predict_held_out(observations, y, fit.linear.columns, variances, fit_rows, test_rows);
 }
 
+/// The named terms as they were found beside the curves: fitted without them, they would take up what the
+/// curves describe.
+JointFit without_curves(const Attribution& found, const std::vector<int>& rows) {
+  JointFit fit = found.final;
+  fit.model.curves.clear();
+  const Observations& observations = found.observations;
+  fit.linear = linearise(observations, fit.model, predict_response(observations, fit.model, rows));
+  fit.linear.columns.clear();
+  fit.variances = CandidateScan(MixedModel(observations, rows), {}, {})
+                      .null_fit(difference(response_components(observations), fit.linear.offset));
+  return fit;
+}
+
 std::string verdict_of(const Explanation& explanation) {
   if (explanation.adopted.empty()) return explanation.unknown.empty() ? "no_structure" : "unknown";
   if (!explanation.unknown.empty()) return "partly_explained";
@@ -42,7 +60,8 @@ std::string verdict_of(const Explanation& explanation) {
 }
 
 /// Too few blocks to find out anything: errors of the baseline, by leaving blocks out where there are two.
-void explain_too_few(const Observations& observations, Explanation& explanation) {
+void explain_too_few(const Observations& observations, const SearchSettings& settings,
+                     Explanation& explanation) {
   const std::vector<int> rows = all_rows(observations);
   const JointFit fit = fit_jointly(observations, {}, rows);
   explanation.residual_before = explanation.residual_after = residuals(observations, fit, rows);
@@ -58,6 +77,9 @@ void explain_too_few(const Observations& observations, Explanation& explanation)
           rmse;
   }
   explanation.after = explanation.before;
+  explanation.detectable =
+      scale_of(observations) *
+      detectable_by_one(MixedModel(observations, rows, fit.variances.ratio), fit.variances, settings.alpha);
   explanation.verdict = "insufficient";
   explanation.warnings.push_back(
       fmt::format("{} blocks are too few to tell an effect from chance; {} are needed", observations.blocks(),
@@ -96,13 +118,13 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
                           .model = {}};
   explanation.warnings = observations.left_out;
   for (const auto& [covariate, why] : observations.not_usable)
-    explanation.warnings.push_back(covariate + " is " + why);
+    explanation.warnings.push_back(fmt::format("{} is {}", covariate, why));
   const std::vector<int> rows = all_rows(observations);
   explanation.untestable = untestable_effects(observations, effects, rows);
   warn_of_constant(observations, explanation);
   warn_of_collinear(observations, explanation);
   if (observations.blocks() < kFewestBlocks) {
-    explain_too_few(observations, explanation);
+    explain_too_few(observations, settings, explanation);
     return explanation;
   }
 
@@ -112,8 +134,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   const Attribution found = attribute(observations, seal.open, effects, settings);
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
-  const double scale = observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
-  explanation.detectable = found.detectable_sigma * scale;
+  explanation.detectable = found.detectable_sigma * scale_of(observations);
 
   // The seal is opened: nothing that was decided above changes any more. Curves have no name, so they are not
   // part of "after" unless they are asked for.
@@ -121,11 +142,8 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   if (settings.empirical)
     for (const FoundCurve& found_curve : found.curves)
       explanation.empirical.push_back(found_curve.curve.label());
-  if (!found.curves.empty() && !settings.empirical) {
-    MeanModel terms = found.final.model;
-    terms.curves.clear();
-    named = found.accepted.empty() ? found.baseline : fit_jointly(found.observations, terms, seal.open);
-  }
+  if (!found.curves.empty() && !settings.empirical)
+    named = found.accepted.empty() ? found.baseline : without_curves(found, seal.open);
   const HeldOutErrors before = score(observations, found.baseline, named.variances, seal.open, seal.sealed);
   const Observations& wide = found.observations;
   const HeldOutErrors after = score(wide, named, named.variances, seal.open, seal.sealed);
@@ -139,6 +157,10 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   settings.progress("estimating parameters");
   const JointFit whole = fit_jointly(wide, found.final.model, rows);
   const JointFit whole_baseline = fit_jointly(observations, {}, rows);
+  for (const Accepted& accepted : found.accepted)
+    if (at_bound(whole, accepted.term))
+      explanation.warnings.push_back(fmt::format(
+          "with the sealed blocks in, {} goes to its physical bound: doubt it", accepted.term.label()));
   explanation.model = whole.model;
   explanation.residual_before = residuals(observations, whole_baseline, rows);
   const HeldOutErrors fitted = score(wide, whole, whole.variances, rows, rows);

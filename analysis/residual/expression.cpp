@@ -24,17 +24,19 @@ struct Expression::Parser {
 
 namespace {
 
-/// Quoted names and ranks become identifiers v0_, v1_, …; `names` says what each stands for.
+/// Quoted names and ranks become identifiers v0_, v1_, …, with as many v as keep them apart from the names
+/// that the text has; `names` says what each stands for.
 std::string with_identifiers(std::string_view text, const std::string& file,
                              std::map<std::string, std::string>& names) {
-  std::string result;
+  std::string result, prefix = "v";
+  while (text.find(prefix) != std::string_view::npos) prefix += "v";
   const auto put = [&](const std::string& name) {
     for (const auto& [identifier, known] : names)
       if (known == name) {
         result += identifier;
         return;
       }
-    const std::string identifier = fmt::format("v{}_", names.size());
+    const std::string identifier = fmt::format("{}{}_", prefix, names.size());
     names.emplace(identifier, name);
     result += identifier;
   };

@@ -221,6 +221,11 @@ MeanModel refit(const Observations& observations, const MeanModel& start, const 
   return model;
 }
 
+bool at_bound(const JointFit& fit, const Term& term) {
+  return std::find(fit.at_bound.begin(), fit.at_bound.end(),
+                   term.label() + " " + term.effect->parameters[0].name) != fit.at_bound.end();
+}
+
 JointFit fit_jointly(const Observations& observations, const MeanModel& start, const std::vector<int>& rows) {
   JointFit fit{.model = start, .linear = {}, .variances = {}, .at_bound = {}};
   const MixedModel mixed(observations, rows);
@@ -241,7 +246,7 @@ JointFit fit_jointly(const Observations& observations, const MeanModel& start, c
     const double value = fit.model.terms[f.term].parameters[f.parameter];
     const double margin = 1e-6 * (parameter.upper - parameter.lower);
     if (value <= parameter.lower + margin || value >= parameter.upper - margin)
-      fit.at_bound.push_back(fit.model.terms[f.term].effect->name + " " + parameter.name);
+      fit.at_bound.push_back(fit.model.terms[f.term].label() + " " + parameter.name);
   }
   return fit;
 }

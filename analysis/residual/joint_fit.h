@@ -37,9 +37,12 @@ struct JointFit {
   MeanModel model;
   LinearModel linear;
   NullFit variances;                  // with the model in
-  std::vector<std::string> at_bound;  // "creep time_constant"
+  std::vector<std::string> at_bound;  // "creep of rotor 2 time_constant"
   bool converged = true;
 };
+
+/// Whether a term's amplitude has come to the end of its physical bounds.
+bool at_bound(const JointFit& fit, const Term& term);
 
 /// Weighted by the variances of the mixed model, which are fitted anew after; group constants and curves are
 /// linear and are projected out. Parameters stay within their physical bounds.

@@ -204,6 +204,20 @@ struct CandidateScan::Impl {
     b += weight * stratum_b;
   }
 
+  /// Degrees of freedom that the adopted columns take of one stratum: its part of the trace of their hat
+  /// matrix.
+  double spent(const Data& data, const State& state, std::size_t stratum) const {
+    if (adopted == 0) return 0;
+    SmallMatrix all = SmallMatrix::Zero(adopted, adopted), own = all;
+    SmallVector unused = SmallVector::Zero(adopted);
+    for (std::size_t s = 0; s < model.strata().size(); ++s) {
+      accumulate(data, 0, -1, s, state, all, unused);
+      if (s == stratum) accumulate(data, 0, -1, s, state, own, unused);
+    }
+    const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(all);
+    return solver.solve(MatrixXd(own)).trace();
+  }
+
   double residual(const Data& data, Index set, int candidate, std::size_t s, const State& state) const {
     SmallMatrix a(state.amplitude.size(), state.amplitude.size());
     SmallVector b(state.amplitude.size());
@@ -282,7 +296,8 @@ NullFit CandidateScan::null_fit(const Components& y) const {
   NullFit result{
       .ratio = state.ratio, .sigma = {}, .ratio_probability = {}, .log_likelihood = state.log_likelihood};
   for (std::size_t s = 0; s < data.size(); ++s) {
-    result.sigma.push_back(std::sqrt(state.rss[s] / static_cast<double>(impl_->model.dof(s))));
+    const double dof = static_cast<double>(impl_->model.dof(s)) - impl_->spent(products, state, s);
+    result.sigma.push_back(std::sqrt(state.rss[s] / std::max(dof, 1.0)));
     std::vector<double> probability;
     for (std::size_t ratio = 0; ratio < impl_->model.ratios(); ++ratio) {
       Impl::State other = state;

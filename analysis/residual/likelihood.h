@@ -18,8 +18,8 @@ struct Candidate {
 
 /// How well the model without candidates fits one data set.
 struct NullFit {
-  std::vector<std::size_t> ratio;                      // of each stratum, index in kRatios
-  std::vector<double> sigma;                           // run scatter of each stratum, in y
+  std::vector<std::size_t> ratio;  // of each stratum, index in kRatios
+  std::vector<double> sigma;       // run scatter of each stratum, in y; what the columns cost is allowed for
   std::vector<std::vector<double>> ratio_probability;  // likelihood of each ratio, normalised
   double log_likelihood = 0;
 };

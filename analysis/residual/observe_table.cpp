@@ -212,6 +212,10 @@ void set_other_axes(const TableSchema& schema, const std::string& baseline, Obse
   std::string_view quantity;
   for (const TableColumn& column : schema.covariates)
     if (column.column == baseline) quantity = unit_from_name(column.unit).quantity;
+  // A load that is the baseline need not be a covariate: the others' unit says what it is.
+  for (const TableColumn& column : schema.covariates)
+    if (quantity.empty() && unit_from_name(column.unit).quantity == unit_from_name("N").quantity)
+      quantity = unit_from_name(column.unit).quantity;
   for (const TableColumn& column : schema.covariates)
     if (column.column != baseline && !quantity.empty() && unit_from_name(column.unit).quantity == quantity)
       result.other_axes.push_back(column.meaning.empty() ? column.column : column.meaning);
@@ -226,6 +230,16 @@ void set_groups_within_blocks(Observations& result) {
   result.groups_within_blocks = result.groups() > 1 && !result.blocks_are_rows &&
                                 std::all_of(blocks_of_group.begin(), blocks_of_group.end(),
                                             [](const auto& g) { return g.second.size() == 1; });
+}
+
+/// What the baseline is over is a condition as well: a curve over it shows where a line or a power law is
+/// wrong.
+void keep_as_covariate(const Source& source, const std::string& column, Observations& result) {
+  for (const TableColumn& covariate : source.table.schema.covariates)
+    if (covariate.column == column) return;
+  Covariate covariate{column, MatrixXd(source.count(), 1)};
+  for (Index r = 0; r < source.count(); ++r) covariate.value(r, 0) = source.cell(r, column);
+  if (result.find(column) == nullptr) result.covariates.push_back(std::move(covariate));
 }
 
 /// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
@@ -255,8 +269,8 @@ void set_baseline(const Source& source, const ObservationChoice& choice, Observa
                            result.baseline, column, std::isnan(x) ? "empty" : "not above 0");
     result.slopes(r, 0) = kind == "power" ? std::log(x) : x;
   }
+  keep_as_covariate(source, column, result);
   if (kind == "linear") set_other_axes(source.table.schema, column, result);
-  std::erase_if(result.covariates, [&](const Covariate& covariate) { return covariate.name == column; });
 }
 
 }  // namespace

@@ -48,6 +48,8 @@ class Search {
   std::pair<double, double> sum_of_squares(const Observations& observations, const JointFit& fit) const;
   /// A joint fit with one term more; theory's coefficient where the data do not speak against it.
   JointFit fit_with(Term term, double amplitude) const;
+  /// p of a likelihood ratio of one parameter of a fitted model: few rows are no large sample.
+  double ratio_p(double ratio, const JointFit& fit) const;
   void read_back_terms();
   /// With a new effect in, an older one may be explained better by another: it gives way.
   void swap_weaker();
@@ -62,6 +64,11 @@ class Search {
   bool add_best_curve();
   /// A name whose work a curve does as well was the wrong name for that curve.
   void drop_what_a_curve_replaces();
+  /// Whether the newest curve, over a covariate of this effect, does more than the effect: then the effect
+  /// was only the curve's straight part.
+  bool outshone_by_curve(const Term& term) const;
+  /// The newest curve with its straight part, which no name takes any more.
+  void restore_trend();
   bool session_scatter_is_large() const;
 
   // what cannot be told apart: search_rivals.cpp

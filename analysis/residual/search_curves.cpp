@@ -25,17 +25,21 @@ void Search::add_curves() {
 bool Search::add_best_curve() {
   settings_.progress("looking for structure without a name");
   Scan scan;
-  std::vector<std::size_t> tried;
+  std::vector<Curve> tried;
   for (std::size_t c = 0; c < curves_.size(); ++c) {
     const bool in = std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
       return found.curve.covariate == curves_[c].covariate &&
              (found.curve.rotor < 0 || found.curve.rotor == curves_[c].rotor);
     });
     if (in) continue;
-    Candidate candidate = as_candidate(curves_[c]);
+    const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
+      return is_over(curves_[c], a.term.effect->covariates);
+    });
+    Curve curve = named ? without_trend(curves_[c], rows_) : curves_[c];
+    Candidate candidate = as_candidate(curve);
     if (!can_be_seen(candidate)) continue;
     scan.candidates.push_back(std::move(candidate));
-    tried.push_back(c);
+    tried.push_back(std::move(curve));
   }
   if (tried.empty()) return false;
   rank(fit_, scan);
@@ -45,12 +49,12 @@ bool Search::add_best_curve() {
   Round round;
   round.observed = scan.fits[best].evidence;
   round.null_maxima = maxima.values();
-  round.outcome = fmt::format("p = {:.3g} for {}", p, curves_[tried[best]].label());
+  round.outcome = fmt::format("p = {:.3g} for {}", p, tried[best].label());
   result_.curve_rounds.push_back(std::move(round));
   if (p > settings_.alpha) return false;
-  result_.curves.push_back({curves_[tried[best]], p});
+  result_.curves.push_back({tried[best], p});
   MeanModel model = fit_.model;
-  model.curves.push_back(curves_[tried[best]]);
+  model.curves.push_back(tried[best]);
   fit_ = fit_jointly(observations_, model, rows_);
   read_back_terms();
   return true;
@@ -59,14 +63,40 @@ bool Search::add_best_curve() {
 void Search::drop_what_a_curve_replaces() {
   for (std::size_t t = result_.accepted.size(); t-- > 0;) {
     if (result_.accepted[t].term.per_group) continue;  // stands in the baseline
+    const bool outshone = outshone_by_curve(result_.accepted[t].term);
     const JointFit without = fit_without(t);
     const double ratio = std::max(0.0, fit_.variances.log_likelihood - without.variances.log_likelihood);
-    const double z = std::sqrt(2 * ratio);
-    if (std::erfc(z / std::numbers::sqrt2) < kKeptP) continue;
+    if (ratio_p(ratio, fit_) < kKeptP && !at_bound(fit_, result_.accepted[t].term) && !outshone) continue;
     result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
     fit_ = without;
     read_back_terms();
+    if (outshone) restore_trend();
   }
+}
+
+bool Search::outshone_by_curve(const Term& term) const {
+  const Curve& curve = result_.curves.back().curve;
+  if (curve.tilt.empty() || !is_over(curve, term.effect->covariates)) return false;
+  const AmplitudeFit fit = fit_amplitudes(observations_, difference(y_, fit_.linear.offset),
+                                          fit_.linear.columns, fit_.variances, rows_);
+  const auto columns = static_cast<Eigen::Index>(curve.columns.size());
+  const Eigen::VectorXd amplitude = fit.amplitude.tail(columns);
+  Eigen::MatrixXd drawn = Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels());
+  for (Eigen::Index k = 0; k < columns; ++k)
+    drawn += amplitude(k) * curve.columns[static_cast<std::size_t>(k)][0];
+  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+  return rms_of(drawn) > rms_of(respond(term, observations_, predicted).value[0]);
+}
+
+void Search::restore_trend() {
+  Curve& curve = result_.curves.back().curve;
+  for (const Curve& plain : curves_)
+    if (plain.covariate == curve.covariate && plain.rotor == curve.rotor && plain.shape == curve.shape &&
+        plain.columns.size() == curve.columns.size())
+      curve = plain;
+  fit_.model.curves.back() = curve;
+  fit_ = fit_jointly(observations_, fit_.model, rows_);
+  read_back_terms();
 }
 
 bool Search::session_scatter_is_large() const {

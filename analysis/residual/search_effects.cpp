@@ -16,11 +16,14 @@ namespace {
 using Eigen::Index;
 
 constexpr double kKnownPhysicsWeight = 10;  // theory gives the coefficient: a prior that others lack
-constexpr double kSwapDecades = 0.7;        // another explains that much better: it takes the place
+constexpr double kRareWeight = 10;       // stiff blades do not flex, while a Reynolds number all blades have
+constexpr double kTheoryRefused = 0.05;  // p at which the data speak against theory's coefficient
+constexpr double kSwapDecades = 0.7;     // another explains that much better: it takes the place
 
 double prior_weight(const Term& term, std::size_t ways) {
   const Effect& effect = *term.effect;
   double weight = effect.theory() ? kKnownPhysicsWeight : 1;
+  if (effect.name == "blade_flex") weight /= kRareWeight;
   if (effect.scope == EffectScope::kRotor && term.rotor >= 0) weight /= 4;
   if (effect.scope == EffectScope::kPair) weight /= 12;
   if (effect.has_change_point()) weight /= std::max<double>(1, static_cast<double>(ways));
@@ -132,10 +135,14 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
     refused.push_back(scan.ways[i].effect);
     JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
     const Term& term = fit.model.terms.back();
-    if (std::any_of(fit.at_bound.begin(), fit.at_bound.end(), [&](const std::string& b) {
-          return b.starts_with(term.effect->name + " " + term.effect->parameters[0].name);
-        })) {
-      round.outcome += fmt::format("{} would leave its physical bounds; ", term.label());
+    // Its own amplitude, and those of the effects before it, which it may push out.
+    const auto outside = std::find_if(fit.model.terms.rbegin(), fit.model.terms.rend(),
+                                      [&](const Term& each) { return at_bound(fit, each); });
+    if (outside != fit.model.terms.rend()) {
+      round.outcome +=
+          outside->same_way(term)
+              ? fmt::format("{} would leave its physical bounds; ", term.label())
+              : fmt::format("with {}, {} would leave its physical bounds; ", term.label(), outside->label());
       continue;
     }
     const CrossValidation after = cross_validate(observations_, difference(y_, fit.linear.offset),
@@ -181,6 +188,7 @@ void Search::let_groups_differ() {
   if (more <= 0 || after.second <= 0) return;
   const double f = (before.first - after.first) / more / (after.first / after.second);
   if (!(f > 0) || f_upper_p(f, more, after.second) > settings_.alpha) return;
+  if (!fit.at_bound.empty()) return;
   const LossDifference gain = compare(
       cross_validate(observations_, difference(y_, fit_.linear.offset), fit_.linear.columns, fit.variances,
                      rows_),
@@ -196,7 +204,7 @@ std::pair<double, double> Search::sum_of_squares(const Observations& observation
                                                  const JointFit& fit) const {
   const MixedModel mixed(observations, rows_);
   const double dof = static_cast<double>(mixed.dof(0) - static_cast<Index>(fit.linear.columns.size()));
-  return {std::pow(fit.variances.sigma[0], 2) * static_cast<double>(mixed.dof(0)), dof};
+  return {std::pow(fit.variances.sigma[0], 2) * std::max(dof, 1.0), dof};
 }
 
 JointFit Search::fit_with(Term term, double amplitude) const {
@@ -210,9 +218,16 @@ JointFit Search::fit_with(Term term, double amplitude) const {
   model.terms.back().at_theory = true;
   model.terms.back().parameters[0] = *parameter.theory;
   JointFit fixed = fit_jointly(observations_, model, rows_);
-  constexpr double kHalfChi2_95 = 1.92;
-  const bool allowed = free.variances.log_likelihood - fixed.variances.log_likelihood < kHalfChi2_95;
+  const double ratio = std::max(0.0, free.variances.log_likelihood - fixed.variances.log_likelihood);
+  const bool allowed = ratio_p(ratio, free) > kTheoryRefused;
   return allowed || term.effect->theory_only ? fixed : free;
+}
+
+double Search::ratio_p(double ratio, const JointFit& fit) const {
+  Index dof = -static_cast<Index>(fit.linear.columns.size());
+  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) dof += mixed_->dof(s);
+  const double n = static_cast<double>(std::max<Index>(dof, 1));
+  return f_upper_p(std::expm1(2 * ratio / (n + 1)) * n, 1, n);
 }
 
 void Search::read_back_terms() {
@@ -274,10 +289,7 @@ void Search::set_detectable(const Scan& scan) {
   }
   if (rms.empty()) return;
   std::nth_element(rms.begin(), rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2), rms.end());
-  // evidence to standard errors: −log10 p of a two-sided normal deviate, and 0.84 for four in five
-  double z = 0;
-  while (-std::log10(std::erfc(z / std::numbers::sqrt2)) < critical_) z += 0.01;
-  result_.detectable_sigma = (z + 0.84) * rms[rms.size() / 2];
+  result_.detectable_sigma = deviates(critical_) * rms[rms.size() / 2];
 }
 
 double Search::rms_of(const Eigen::MatrixXd& column) const {

@@ -29,8 +29,15 @@ std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& wit
                                    const Scan& scan) const {
   std::vector<Ranked> result;
   const Components y = difference(y_, without.linear.offset);
-  const auto validate = [&](const Candidate& candidate) {
+  const Eigen::MatrixXd predicted = predict_response(observations_, without.model, rows_);
+  const auto validate = [&](const Term& way, const Candidate& candidate) {
     std::vector<Components> columns = without.linear.columns;
+    if (way.effect->theory_only) {  // with another amplitude it would be another effect
+      Term at_theory = way;
+      at_theory.parameters[0] = *way.effect->theory();
+      return cross_validate(observations_, difference(y, respond(at_theory, observations_, predicted).value),
+                            columns, fit_.variances, rows_);
+    }
     columns.push_back(candidate.columns[0]);
     return cross_validate(observations_, y, columns, fit_.variances, rows_);
   };
@@ -38,7 +45,7 @@ std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& wit
   for (const std::size_t i : scan.order)
     if (!own && scan.ways[i].effect->name == accepted.term.effect->name &&
         scan.ways[i].rotor == accepted.term.rotor)
-      own = validate(scan.candidates[i]);
+      own = validate(scan.ways[i], scan.candidates[i]);
   if (!own) return result;
   std::vector<std::string> done = {accepted.term.effect->name};
   for (const std::size_t i : scan.order) {
@@ -50,12 +57,12 @@ std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& wit
     const bool listed = std::any_of(result.begin(), result.end(),
                                     [&](const Ranked& r) { return r.term.effect->name == name; });
     if (listed) continue;
-    const LossDifference difference = compare(validate(scan.candidates[i]), *own);
+    const LossDifference difference = compare(validate(scan.ways[i], scan.candidates[i]), *own);
     if (difference.mean >= 2 * std::min(difference.standard_error, difference.expected_standard_error))
       continue;
     Term term = scan.ways[i];
-    term.parameters[0] = scan.fits[i].amplitude(0);
-    result.push_back({term, scan.fits[i].evidence, 0, scan.fits[i].amplitude(0), 0});
+    term.parameters[0] = term.effect->theory_only ? *term.effect->theory() : scan.fits[i].amplitude(0);
+    result.push_back({term, scan.fits[i].evidence, 0, term.parameters[0], 0});
   }
   return result;
 }

@@ -155,7 +155,14 @@ TEST(ModelVersion, IsReadAsItWasWritten) {
   step.first_run = "R3";
   ModelVersion model = model_of({term("creep", {0.0123456789012345, 100}, {0.1}), step});
   model.curves = {
-      {.covariate = "clip", .rotor = 1, .low = 0, .high = 0.8, .coefficients = {1, 2}, .centre = {0, 0.3}}};
+      {.covariate = "clip", .rotor = 1, .low = 0, .high = 0.8, .coefficients = {1}, .centre = {0}},
+      {.covariate = "rpm",
+       .shape = CurveShape::kLogParabola,
+       .low = 1,
+       .high = 2,
+       .coefficients = {2},
+       .centre = {0.3},
+       .tilt = {0.1}}};
   model.covariance = 0.5 * Eigen::MatrixXd::Identity(6, 6);
   model.covariance(1, 0) = model.covariance(0, 1) = 1.0 / 3;
   const ModelVersion read = model_from_json(model_json(model), "m");

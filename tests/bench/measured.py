@@ -248,6 +248,8 @@ def strawson(loop, data):
         inside = "supply_voltage" in names([found]) + rivals([found])
         better = found["after"]["held_out_rmse"] < found["before"]["held_out_rmse"]
         yield line(f"Strawson, one table, {what}", "3S → 2S", [found], [scale(rows)], goal, also=inside and better)
+    found = loop.explain(table("Strawson", rows, arguments=throttle), "--adopt-empirical")
+    yield line("Strawson, one table, signal", "3S → 2S", [found], [scale(rows)], remark="--adopt-empirical")
 
 
 # --- FARE-KE load cells ---------------------------------------------------------------------------------------------

@@ -172,6 +172,20 @@ TEST(Effects, AreFiniteOverBoundsAndConditions) {
   }
 }
 
+TEST(Effects, ImagesInGroundAndCeilingHaveNoPole) {
+  for (const Effect& effect : all_effects()) {
+    if (effect.form != "image") continue;
+    SCOPED_TRACE(title(effect));
+    const double strongest = effect.parameters[0].upper;
+    for (double distance_R = 0.1; distance_R < 6; distance_R += 0.05) {
+      const std::vector<double> x = {distance_R};
+      const double force_N = effect.force_N({.x = x, .reference = x}, &strongest, 1.0);
+      EXPECT_GT(force_N, 1) << distance_R;
+      EXPECT_LE(force_N, 4) << distance_R;
+    }
+  }
+}
+
 TEST(Effects, TheFirstRunHasNoPredecessor) {
   std::mt19937_64 random(test::seed() + 2);
   for (const Effect& effect : all_effects()) {

@@ -269,5 +269,31 @@ TEST_F(ExplainTest, RoundsKeepWhatTheySaw) {
   EXPECT_EQ(e.rounds[0].ranking[0].term.effect->name, "supply_voltage");
 }
 
+TEST_F(ExplainTest, RotorSpeedIsARivalAtItsOwnExponentOnly) {
+  Observations o = observations(16);
+  test::add_covariate(o, "speed_rpm", 0, 1, random);
+  // Speed follows the supply: with an exponent of a half, speed would do as well, and with two it does not.
+  for (Covariate& covariate : o.covariates)
+    if (covariate.name == "speed_rpm")
+      covariate.value = o.rig.nominal_speed_rpm / 16 * o.find("supply_voltage_V")->value;
+  test::add_effect(o, "supply_voltage", {0.5});
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.adopted.size(), 1u);
+  EXPECT_NE(e.adopted[0].term.effect->name, "rotor_speed");
+  EXPECT_THAT(e.adopted[0].confounded_with, testing::Not(Contains("rotor_speed")));
+}
+
+TEST_F(ExplainTest, WhatWouldBeDetectedIsFiniteWhereNothingCanBeTested) {
+  Observations o = observations(16);
+  o.covariates.clear();
+  const Explanation nothing = explain(o, {&test::effect_named("supply_voltage")}, quick());
+  EXPECT_EQ(nothing.verdict, "no_structure");
+  // 128 runs of four rotors, session variance 0.4 of the runs': 3.17 standard errors of one effect
+  EXPECT_NEAR(nothing.detectable, 7 * 0.002 * 3.17 * std::sqrt(1.4 / 125 / 4), 0.4 * nothing.detectable);
+  const Explanation few = explained(observations(5));
+  EXPECT_EQ(few.verdict, "insufficient");
+  EXPECT_GT(few.detectable, 0);
+}
+
 }  // namespace
 }  // namespace tunnelrig

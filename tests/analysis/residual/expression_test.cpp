@@ -61,5 +61,14 @@ TEST(Expression, SurvivesBeingMoved) {
   EXPECT_EQ(second({21}), 42);
 }
 
+TEST(Expression, ColumnsNamedLikeItsOwnIdentifiersStayApart) {
+  const Expression expression("v0_ + 10 * 'a b' + 100 * vv0_", "t.toml");
+  ASSERT_EQ(expression.names().size(), 3u);
+  std::vector<double> values;
+  for (const std::string& name : expression.names())
+    values.push_back(name == "v0_" ? 1 : name == "a b" ? 2 : 3);
+  EXPECT_EQ(expression(values), 321);
+}
+
 }  // namespace
 }  // namespace tunnelrig

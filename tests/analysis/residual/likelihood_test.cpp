@@ -166,5 +166,23 @@ TEST(Likelihood, FourRotorsFindWhatOneRotorHas) {
   EXPECT_NEAR(fits[0].amplitude(0), 0.003, 0.0015);
 }
 
+TEST(NullFit, ScatterAllowsForWhatTheColumnsCost) {
+  std::mt19937_64 random(test::seed());
+  constexpr int kDraws = 400;
+  constexpr double kSigma = 0.002;
+  double sum = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    Observations o = test::simulate(
+        {.runs_of_block = std::vector<int>(8, 1), .groups = 1, .sigma = kSigma, .session_ratio = 0}, random);
+    o.blocks_are_rows = true;
+    const MixedModel model(o, test::all_rows(o));
+    std::vector<Components> columns;
+    for (int k = 0; k < 3; ++k) columns.push_back({Eigen::MatrixXd::Random(o.rows(), o.channels())});
+    const NullFit fit = CandidateScan(model, columns, {}).null_fit({o.y});
+    sum += fit.sigma[0] * fit.sigma[0];
+  }
+  EXPECT_NEAR(sum / kDraws / (kSigma * kSigma), 1, 0.2) << "8 runs, a constant and three columns";
+}
+
 }  // namespace
 }  // namespace tunnelrig

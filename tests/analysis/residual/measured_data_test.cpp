@@ -101,6 +101,14 @@ TEST_F(GroundEffect, IsNamedForRotorsSideBySide) {
   EXPECT_LE(percent(e, "after"), 1.3) << "Cheeseman and Bennett";
 }
 
+TEST_F(GroundEffect, KeepsTheTheorysStrengthWhereFiveHeightsDoNotSpeakAgainstIt) {
+  SKIP_WITHOUT_SHARED_DATA();
+  const json e = of("coplanar", "sin(rank(ground_distance_R)*10*_pi) > 0");  // beyond the lowest height
+  EXPECT_THAT(named(e), testing::ElementsAre("ground_effect"));
+  EXPECT_EQ(e["adopted"][0]["parameters"]["strength"]["theory"], true);
+  EXPECT_LE(percent(e, "after"), 1.5);
+}
+
 TEST_F(GroundEffect, TakesTheExponentialWhereItIsBetter) {
   SKIP_WITHOUT_SHARED_DATA();
   const json e = of("face_to_face", kEverySecondHeight);
@@ -142,6 +150,18 @@ TEST_F(UiucStatic, ATrendWithSpeedIsReynoldsOrASetThatHoldsIt) {
     const json e = of(propeller, "");
     EXPECT_TRUE(in_a_set(e, "reynolds_number")) << propeller << " " << e["verdict"];
     EXPECT_LT(e["after"]["held_out_rmse"], 0.5 * e["before"]["held_out_rmse"].get<double>()) << propeller;
+  }
+}
+
+TEST_F(UiucStatic, ACurveWithoutANameIsScoredBesideTheName) {
+  SKIP_WITHOUT_SHARED_DATA();
+  for (const std::string propeller : {"apcsp 11.0x4.0 - 2", "ancf 15.0x8.0 - 2", "mas 9.0x6.0 - 2"}) {
+    of(propeller, "rank(N) > 0.7");
+    const auto result = test::run_program(folder.path(), "explain --db t.db --adopt-empirical --json e.json");
+    EXPECT_EQ(result.code, 0) << result.error;
+    EXPECT_THAT(result.error, HasSubstr("nothing is stored"));
+    const json e = json::parse(read_text(folder / "e.json"));
+    EXPECT_EQ(e["empirical"].size(), e["unknown"].size()) << propeller;
   }
 }
 
@@ -203,6 +223,24 @@ TEST_F(Strawson, ThrottleAloneLacksTheSupply) {
   EXPECT_LT(e["after"]["held_out_rmse"], 0.5 * e["before"]["held_out_rmse"].get<double>());
 }
 
+TEST_F(Strawson, NoAdoptedAmplitudeStandsAtItsBound) {
+  SKIP_WITHOUT_SHARED_DATA();
+  write_sweeps();
+  for (const std::string hold_out : {"", "hold_out = \"cells == 2\"\n"}) {
+    const json e = explained("groups = [\"group\"]\nblocks = \"rows\"\n" + hold_out +
+                                 "[response]\ncolumn = \"thrust_gf\"\nunit = \"gf\"\nmeaning = \"thrust_N\"\n"
+                                 "[[covariates]]\ncolumn = \"voltage_V\"\nunit = \"V\"\nmeaning = "
+                                 "\"supply_voltage_V\"\n",
+                             "--baseline power:esc_us");
+    for (const json& adopted : e["adopted"]) {
+      if (adopted["effect"] != "supply_voltage") continue;
+      const double exponent = adopted["parameters"]["exponent"]["value"];
+      EXPECT_GT(exponent, 0.01) << hold_out;
+      EXPECT_LT(exponent, 3.99) << hold_out;
+    }
+  }
+}
+
 /// Three axes of five loads each; every axis was loaded in another position of the cell.
 struct Fareke : MeasuredLoop {
   json of(int cell, char axis) const {
@@ -222,18 +260,24 @@ struct Fareke : MeasuredLoop {
   }
 };
 
-TEST_F(Fareke, NothingIsNamedFromFifteenRows) {
+TEST_F(Fareke, CrosstalkIsNamedAndNothingElse) {
   SKIP_WITHOUT_SHARED_DATA();
-  // Crosstalk needs the other channel's response, which a table of one response does not hold: it is
-  // untestable and says so, and no other name is given in its place.
+  for (const auto& [cell, axis] : {std::pair{1, 'x'}, {3, 'x'}, {3, 'z'}, {4, 'x'}, {4, 'y'}}) {
+    const json e = of(cell, axis);
+    EXPECT_THAT(named(e), testing::ElementsAre("crosstalk", "crosstalk")) << cell << axis;
+    EXPECT_LT(e["after"]["held_out_rmse"], 0.5 * e["before"]["held_out_rmse"].get<double>()) << cell << axis;
+  }
   for (const int cell : {1, 3, 4})
-    for (const char axis : {'x', 'y', 'z'}) {
-      const json e = of(cell, axis);
-      EXPECT_TRUE(e["adopted"].empty()) << cell << axis << " " << e["adopted"];
-      const auto& list = e["untestable"];
-      EXPECT_TRUE(
-          std::any_of(list.begin(), list.end(), [](const json& u) { return u["effect"] == "crosstalk"; }));
-    }
+    for (const char axis : {'x', 'y', 'z'})
+      EXPECT_THAT(named(of(cell, axis)), testing::Each("crosstalk")) << cell << axis;
+}
+
+TEST_F(Fareke, TheGrossRowIsFoundAndNotAbsorbed) {
+  SKIP_WITHOUT_SHARED_DATA();
+  const json e = of(3, 'y');  // its row of 151 gf is wrong in the original
+  ASSERT_FALSE(e["suspect_rows"].empty());
+  EXPECT_EQ(e["suspect_rows"][0]["row"], "t.csv:8");
+  EXPECT_THAT(named(e), testing::Each("crosstalk"));
 }
 
 }  // namespace
