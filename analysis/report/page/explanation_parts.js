@@ -76,7 +76,7 @@ function errorFigure(explanation, made) {
       'by resampling the blocks. The noise floor,',
       `${digits(floor, 4)}${unitSuffix(unit)}, is the error to expect of an exact model: scatter of runs`,
       'and sessions, and the uncertainty of its coefficients.',
-      explanation.unknown.length &&
+      explanation.unknown.length && !(explanation.empirical || []).length &&
           'Structure without a name is no part of the error after, but is allowed for in the floor.');
   return figure(
       'Held-out error', [],
