@@ -59,6 +59,9 @@ struct MatcherSettings {
   /// show.
   double most_misfit_m = 0.012;
   double ambiguity = 0.8;  // another place that fits with this share of the inliers
+
+  /// Throws InputError for settings that make no sense, naming the value and the rule.
+  void validate() const;
 };
 
 enum class Rejection { none, few_beams, poor_fit, noisy, unobservable, ambiguous, outside };
