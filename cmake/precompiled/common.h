@@ -1,5 +1,5 @@
-// What most sources include, parsed once for each library. Sources name their includes all the same: the clang-tidy
-// stage builds without this.
+// What most sources include, parsed once for each library. Sources name their includes all the same: the
+// clang-tidy stage builds without this.
 #pragma once
 
 #include <algorithm>
