@@ -103,7 +103,8 @@ TEST_F(Health, AnOldCertificateAndAnOpenLedger) {
     points.rows.pop_back();
     file.set_sheet("calibration", points);
     file.database().execute(
-        "INSERT INTO ledgers VALUES (1, 500, 400, 50, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, NULL, 'complete', "
+        "INSERT INTO ledgers VALUES (1, 500, 400, 50, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, NULL, NULL, NULL, NULL, "
+        "'complete', "
         "'tcp:x')");
   }
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("calibration: made from other points"));

@@ -166,7 +166,7 @@ struct Moments {
 Moments moments_of(Noise kind, NoiseModel& model) {
   Moments sum;
   double squares = 0, fourths = 0, lags = 0, products = 0, rows = 0;
-  double between = 0, within = 0, sessions = 0, per_session = 0;
+  double between = 0, within = 0, sessions = 0;
   for (std::uint64_t seed = test::seed(); seed < test::seed() + 60; ++seed) {
     const Campaign campaign = generate({.noise = kind, .runs = 430, .seed = seed});
     model = campaign.noise;
@@ -179,7 +179,6 @@ Moments moments_of(Noise kind, NoiseModel& model) {
       for (const std::size_t i : indices) {
         for (std::size_t r = 0; r < kRotors; ++r) mean[r] += campaign.scatter[i][r] / n;
       }
-      per_session += n;
       ++sessions;
       between += mean[0] * mean[0] / (model.session * model.session + model.run * model.run / n);
       double inside = 0;
