@@ -13,7 +13,7 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct CalibrateOptions {
   std::string db, points, propellers, loss = "ordinary", matrix, force_unit = "N", zeros = "block";
   std::vector<std::string> forces, readings;
   bool diagonal = false, keep_gross = false, json = false;
@@ -35,7 +35,7 @@ void take_sheet(CampaignFile& file, const std::string& path, const char* name, P
   file.set_sheet(name, sheet);
 }
 
-int calibrate_campaign(const Options& options) {
+int calibrate_campaign(const CalibrateOptions& options) {
   CampaignFile file(options.db, CampaignFile::Access::kWrite);
   const CampaignInfo info = file.info();
   CalibrationOptions how{.rotors = info.rig.rotors};
@@ -65,7 +65,7 @@ int calibrate_campaign(const Options& options) {
   return certificate.passed() ? kWell : kProblemFound;
 }
 
-int calibrate_matrix(const Options& options) {
+int calibrate_matrix(const CalibrateOptions& options) {
   if (options.forces.empty() || options.forces.size() != options.readings.size()) {
     throw InputError("--matrix: --forces and --readings name the columns of as many axes as channels");
   }
@@ -88,7 +88,7 @@ int calibrate_matrix(const Options& options) {
   return fit.suspicious.empty() ? kWell : kProblemFound;
 }
 
-int run(const Options& options) {
+int run_calibrate(const CalibrateOptions& options) {
   if (!options.matrix.empty()) return calibrate_matrix(options);
   if (options.db.empty()) throw InputError("calibrate: --db FILE is required (or --matrix CSV)");
   return calibrate_campaign(options);
@@ -97,7 +97,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_calibrate(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateOptions>();
   CLI::App* verb =
       app.add_subcommand("calibrate", "Fit load cells and propellers; print and store the certificate");
   verb->footer(
@@ -125,7 +125,7 @@ void add_calibrate(CLI::App& app, Work& work) {
       ->capture_default_str();
   verb->add_flag("--diagonal", options->diagonal, "One gain per axis, no crosstalk");
   verb->add_flag("--json", options->json, "Print as JSON");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_calibrate(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

@@ -13,7 +13,7 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct DevicesOptions {
   std::string serial;
   bool json = false, statistics = false, loader = false;
 };
@@ -105,7 +105,7 @@ int reboot_to_loader(const std::string& serial) {
   return kWell;
 }
 
-int run(const Options& options) {
+int run_devices(const DevicesOptions& options) {
   if (options.loader) return reboot_to_loader(options.serial);
   std::vector<UsbDevice> found = list_usb_boards();
   std::erase_if(found, [&](const UsbDevice& device) { return !device.serial.starts_with(options.serial); });
@@ -131,7 +131,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_devices(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DevicesOptions>();
   CLI::App* verb = app.add_subcommand("devices", "List the boards on USB, with what they say of themselves");
   verb->footer(
       "Exit code 1: there is a board that cannot be used; the table says why.\n\n"
@@ -142,7 +142,7 @@ void add_devices(CLI::App& app, Work& work) {
   verb->add_flag("--json", options->json, "Print as JSON");
   verb->add_flag("--loader", options->loader,
                  "Restart the board in its ROM loader, to be flashed by dfu-util");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_devices(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

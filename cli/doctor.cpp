@@ -14,7 +14,7 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct DoctorOptions {
   std::string db;
   bool json = false;
 };
@@ -48,7 +48,7 @@ void print(const std::vector<Finding>& findings) {
   }
 }
 
-int run(const Options& options) {
+int run_doctor(const DoctorOptions& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   const std::vector<Finding> findings = look_at(file);
   const auto problems = std::count_if(findings.begin(), findings.end(), [](const Finding& finding) {
@@ -76,13 +76,13 @@ int run(const Options& options) {
 }  // namespace
 
 void add_doctor(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DoctorOptions>();
   CLI::App* verb =
       app.add_subcommand("doctor", "Check a campaign file and say what to do about what is wrong");
   verb->footer("Exit code 0: all is well; 1: problems were found.\n\nExample: tunnelrig doctor --db my.db");
   verb->add_option("--db", options->db, "Campaign file")->required();
   verb->add_flag("--json", options->json, "Print as JSON");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_doctor(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

@@ -17,7 +17,7 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct ExplainOptions {
   std::string db, response, baseline, json, html, effects;
   SearchSettings search;
   bool list = false, adopt = false, adopt_empirical = false;
@@ -35,7 +35,7 @@ struct Candidates {
   }
 };
 
-Observations observations_of_file(const Options& options) {
+Observations observations_of_file(const ExplainOptions& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   if (file.text("table.toml"))
     return observe_table(observations_of(file), {options.response, options.baseline});
@@ -44,7 +44,7 @@ Observations observations_of_file(const Options& options) {
   return observe_campaign(data, {options.response, options.baseline});
 }
 
-int list(const Options& options) {
+int list(const ExplainOptions& options) {
   const Candidates candidates(options.effects);
   std::optional<Observations> observations;
   if (!options.db.empty()) observations = observations_of_file(options);
@@ -55,7 +55,7 @@ int list(const Options& options) {
 }
 
 /// Stores what was accepted as the next version of the model, and says so.
-void adopt_and_store(const Options& options, const Observations& observations,
+void adopt_and_store(const ExplainOptions& options, const Observations& observations,
                      const Explanation& explanation) {
   Adoption adoption = adopt(observations, explanation, options.adopt_empirical);
   for (const std::string& note : adoption.notes) warn(note);
@@ -72,7 +72,7 @@ void adopt_and_store(const Options& options, const Observations& observations,
              adoption.model->name());
 }
 
-int run(Options options) {
+int run_explain(ExplainOptions options) {
   if (options.list) return list(options);
   if (options.db.empty()) throw InputError("--db is required (all but --list need a campaign)");
   if ((options.adopt || options.adopt_empirical) && !options.effects.empty())
@@ -114,7 +114,7 @@ int run(Options options) {
 }  // namespace
 
 void add_explain(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExplainOptions>();
   CLI::App* verb = app.add_subcommand("explain", "Trace the residual to the effect that the model lacks");
   verb->footer(
       "Seals a quarter of the sessions, searches on the rest, opens the seal once; docs/closed-loop.md.\n\n"
@@ -150,7 +150,7 @@ void add_explain(CLI::App& app, Work& work) {
   verb->add_flag("--adopt", options->adopt, "Store the accepted effects as the next version of the model");
   verb->add_flag("--adopt-empirical", options->adopt_empirical,
                  "Count the curves that have no name in the error after, and store them with the effects");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_explain(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

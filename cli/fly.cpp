@@ -15,7 +15,7 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct FlyOptions {
   std::string map, tunnel, scenario = "circle", gains, json, out, tune, position = "lidar";
   std::vector<std::string> controllers;
   int runs = 20, workers = 0, budget = 300;
@@ -29,13 +29,13 @@ struct NamedMap {
   std::string name;
 };
 
-NamedMap map_of(const Options& options) {
+NamedMap map_of(const FlyOptions& options) {
   if (options.map.empty())
     return {published_disturbance_map(), "published_field (simulated; no measured map was given)"};
   return {read_disturbance_map(options.map), options.map};
 }
 
-std::vector<std::string> controllers_of(const Options& options) {
+std::vector<std::string> controllers_of(const FlyOptions& options) {
   if (!options.controllers.empty()) return options.controllers;
   std::vector<std::string> names;
   for (const ControllerKind& kind : controller_kinds()) names.emplace_back(kind.name);
@@ -46,7 +46,7 @@ struct PlaceAndPath {
   std::string tunnel, scenario;
 };
 
-std::vector<PlaceAndPath> programme_of(const Options& options) {
+std::vector<PlaceAndPath> programme_of(const FlyOptions& options) {
   if (options.scenario != "all") {
     std::string tunnel = options.tunnel;
     if (tunnel.empty()) tunnel = tunnel_of_scenario(options.scenario);
@@ -59,7 +59,7 @@ std::vector<PlaceAndPath> programme_of(const Options& options) {
 }
 
 /// Everything that can be refused, before anything is flown or printed.
-void check_all(const Options& options, const std::vector<PlaceAndPath>& wanted, const GainTable& gains) {
+void check_all(const FlyOptions& options, const std::vector<PlaceAndPath>& wanted, const GainTable& gains) {
   for (const std::string& name : controllers_of(options)) AnyController(name, gains, {});
   const Airframe frame;
   for (const PlaceAndPath& one : wanted) {
@@ -81,7 +81,7 @@ std::vector<FlightLog> identification_flights(FlightTask task, const std::string
 }
 
 /// Flies one scenario; `gains` and `map` are shared by all.
-FlownScenario fly_scenario(const Options& options, const PlaceAndPath& one, const NamedMap& map,
+FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, const NamedMap& map,
                            const GainTable& gains) {
   const Airframe frame;
   const FlightSpace space(tunnel_from(one.tunnel), frame);
@@ -124,7 +124,7 @@ FlownScenario fly_scenario(const Options& options, const PlaceAndPath& one, cons
   return flown;
 }
 
-int tune_all(const Options& options) {
+int tune_all(const FlyOptions& options) {
   const NamedMap map = map_of(options);
   TuningSettings settings{.budget = options.budget, .workers = options.workers};
   std::vector<Tuned> tuned;
@@ -143,7 +143,7 @@ int tune_all(const Options& options) {
   return kWell;
 }
 
-int run(const Options& options) {
+int run_fly(const FlyOptions& options) {
   options.hidden.validate();
   if (options.position != "lidar" && options.position != "given")
     throw InputError(fmt::format("--position {}: must be lidar or given", options.position));
@@ -173,7 +173,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_fly(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<FlyOptions>();
   CLI::App* verb =
       app.add_subcommand("fly", "Fly a map: controllers through the thesis's scenarios, simulated");
   verb->footer(
@@ -221,7 +221,7 @@ void add_fly(CLI::App& app, Work& work) {
   verb->add_option("--motor-loss", options->hidden.motor_loss,
                    "Undeclared: share of its thrust that a rotor lost");
   verb->add_option("--weak-rotor", options->hidden.weak_rotor, "Which rotor that is, 1 to 4");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_fly(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

@@ -16,14 +16,14 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct ImportVerbOptions {
   std::string source, db, format = "folder", schema, sweeps;
   bool replace = false, allow_stuck = false, json = false;
   std::optional<double> propeller_diameter_m;
   std::optional<int> pole_count;
 };
 
-int import_folder(const Options& options) {
+int import_folder(const ImportVerbOptions& options) {
   ProgressBar bar("import");
   ImportOptions how{.replace = options.replace,
                     .allow_stuck = options.allow_stuck,
@@ -53,7 +53,7 @@ int import_folder(const Options& options) {
   return kWell;
 }
 
-int import_rows(const Options& options) {
+int import_rows(const ImportVerbOptions& options) {
   std::size_t rows = 0;
   if (options.format == "table") {
     if (options.schema.empty())
@@ -75,14 +75,14 @@ int import_rows(const Options& options) {
   return kWell;
 }
 
-int run(const Options& options) {
+int run_import(const ImportVerbOptions& options) {
   return options.format == "folder" ? import_folder(options) : import_rows(options);
 }
 
 }  // namespace
 
 void add_import(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ImportVerbOptions>();
   CLI::App* verb =
       app.add_subcommand("import", "Read a campaign folder, sweeps or a table into a campaign file");
   verb->footer(
@@ -106,7 +106,7 @@ void add_import(CLI::App& app, Work& work) {
   verb->add_option("--pole-count", options->pole_count,
                    "Of the motor, where the speed column counts electrical revolutions");
   verb->add_flag("--json", options->json, "Print the summary as JSON");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_import(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

@@ -20,7 +20,7 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct LogOptions {
   std::string db, location, session, kind = "thrust", source = "virtual", plan, campaign, capture, pace = "1",
                                      faults;
   int repeat = 1;
@@ -44,7 +44,7 @@ double now_s() {
 /// The recorder's side of the verb: a campaign file, a source, and one run after the other.
 class Logging {
  public:
-  explicit Logging(const Options& options)
+  explicit Logging(const LogOptions& options)
       : options_(options), file_(options.db, CampaignFile::Access::kRecord) {
     if (file_.empty()) {
       const std::string toml =
@@ -211,7 +211,7 @@ class Logging {
     return problem ? kProblemFound : kWell;
   }
 
-  const Options& options_;
+  const LogOptions& options_;
   CampaignFile file_;
   CampaignInfo info_;
   std::optional<Certificate> certificate_;
@@ -245,7 +245,7 @@ bool ask_operator(const PlannedRun& planned, const PlannedRun* previous) {
   return std::getline(std::cin, answer) && answer != "q";
 }
 
-int run_plan(const Options& options) {
+int run_plan(const LogOptions& options) {
   const std::vector<PlannedRun> plan = parse_plan(read_csv(options.plan));
   Logging logging(options);
   std::vector<PlannedRun> left;
@@ -263,7 +263,7 @@ int run_plan(const Options& options) {
   return code;
 }
 
-int run_one(const Options& options) {
+int run_one(const LogOptions& options) {
   if (options.location.empty() || options.session.empty())
     throw InputError("log: --location and --session are required (or --plan FILE)");
   Logging logging(options);
@@ -275,7 +275,7 @@ int run_one(const Options& options) {
                         "");
 }
 
-int run(const Options& options) {
+int run_log(const LogOptions& options) {
   if (!(options.duration_s > 0)) throw InputError("--duration: seconds, above 0");
   std::signal(SIGINT, stop_on_signal);
   std::signal(SIGTERM, stop_on_signal);
@@ -293,7 +293,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_log(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LogOptions>();
   CLI::App* verb = app.add_subcommand("log", "Record runs from the board, or from the virtual rig");
   verb->footer(
       "One run, or a plan of them; a plan resumes where it stopped. Ctrl-C ends the run and keeps what was "
@@ -336,7 +336,7 @@ void add_log(CLI::App& app, Work& work) {
       "--faults", options->faults,
       "Virtual rig: "
       "drop=0.001,duplicate=…,reorder=…,corrupt=…,truncate=…,garbage=…,stall=AT:FOR,reboot=AT:FOR");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_log(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

@@ -13,7 +13,7 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct MapOptions {
   std::string db, out, method = "gaussian-process", model, terms;
   int nodes = 41;
   bool json = false;
@@ -47,7 +47,7 @@ void print(const WrittenMaps& written) {
              written.files.size(), written.files.empty() ? "" : written.files[0].parent_path().string());
 }
 
-int run(const Options& options) {
+int run_map(const MapOptions& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   const CampaignData data = read_campaign_data(file);
   const Reduction reduction = reduce_by(data, choose_model(file, options.model, options.terms));
@@ -88,7 +88,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_map(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MapOptions>();
   CLI::App* verb =
       app.add_subcommand("map", "Disturbance maps: change of C_T against OT, and uneven thrust U");
   verb->footer(
@@ -101,7 +101,7 @@ void add_map(CLI::App& app, Work& work) {
   verb->add_option("--nodes", options->nodes, "Of the grid along each side, odd")->capture_default_str();
   add_model_options(*verb, options->model, options->terms);
   verb->add_flag("--json", options->json, "Print the summary as JSON");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_map(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Options {
+struct ModelsOptions {
   std::string db;
   bool json = false;
 };
@@ -70,7 +70,7 @@ void print(const Json& versions) {
   fmt::print("\nerrors are of blocks held out; `reduce --model N` goes by another version\n");
 }
 
-int run(const Options& options) {
+int run_models(const ModelsOptions& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   const std::vector<StoredModel> stored = stored_models(file);
   Json versions = Json::array({thesis_json(stored.empty())});
@@ -85,14 +85,14 @@ int run(const Options& options) {
 }  // namespace
 
 void add_models(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ModelsOptions>();
   CLI::App* verb = app.add_subcommand("models", "List the versions of the model that a campaign file holds");
   verb->footer(
       "`explain --adopt` adds a version; the newest is in force in reduce, map and report; docs/reduction.md."
       "\n\nExample: tunnelrig models --db my.db");
   verb->add_option("--db", options->db, "Campaign file")->required();
   verb->add_flag("--json", options->json, "Print as JSON");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_models(*options); }; });
 }
 
 void add_model_options(CLI::App& verb, std::string& model, std::string& terms) {

@@ -12,14 +12,14 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct PlanOptions {
   std::string out;
   std::string locations;
   bool tunnel_only = false;
   PlanSettings settings;
 };
 
-int run(Options options) {
+int plan_runs(PlanOptions options) {
   PlanSettings settings = thesis_plan();
   if (!options.locations.empty()) {
     settings.tunnel.clear();
@@ -53,7 +53,7 @@ int run(Options options) {
 }  // namespace
 
 void add_plan(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PlanOptions>();
   CLI::App* verb = app.add_subcommand("plan", "Write a plan of runs for `log --plan`");
   verb->footer(
       "Without --locations: the thesis's programme, 42 tunnel locations, OS, GND and CEIL, ten repeats "
@@ -77,7 +77,7 @@ void add_plan(CLI::App& app, Work& work) {
   verb->add_option("--duration", options->settings.duration_s, "Seconds of each run")->capture_default_str();
   verb->add_option("--seed", options->settings.seed, "Of the random order")->capture_default_str();
   verb->add_flag("--tunnel-only", options->tunnel_only, "Leave open space (OS, GND, CEIL) out");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return plan_runs(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

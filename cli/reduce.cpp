@@ -17,7 +17,7 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct ReduceOptions {
   std::string db, csv, runs_csv, plot, convention, model, terms;
   bool from_raw = false, no_spectra = false, json = false;
 };
@@ -31,7 +31,7 @@ std::string inputs_json(const CampaignData& data, const Reduction& reduction) {
 
 /// Recomputes what is stored of the raw data and says where the two differ; afterwards the new values count.
 /// True where all agreed.
-bool refresh_from_raw(const Options& options, CampaignData& data) {
+bool refresh_from_raw(const ReduceOptions& options, CampaignData& data) {
   ProgressBar bar("from raw");
   const auto computed =
       statistics_from_raw(options.db, !options.no_spectra, [&bar](std::size_t done, std::size_t total) {
@@ -99,7 +99,7 @@ bool warn_of_left_out(const CampaignData& data, const Reduction& reduction) {
   return problem;
 }
 
-int reduce_campaign(const Options& options, const CampaignFile& file) {
+int reduce_campaign(const ReduceOptions& options, const CampaignFile& file) {
   CampaignData data = read_campaign_data(file);
   const bool agreed = !options.from_raw || refresh_from_raw(options, data);
   const Convention convention =
@@ -120,7 +120,7 @@ int reduce_campaign(const Options& options, const CampaignFile& file) {
   return problem || !agreed ? kProblemFound : kWell;
 }
 
-int reduce_table(const Options& options, const CampaignFile& file) {
+int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
   if (!options.model.empty() && options.model != "thesis")
     throw InputError(fmt::format("--model {}: a table is reduced as it is, without a model", options.model));
   const Convention convention =
@@ -169,7 +169,7 @@ int reduce_table(const Options& options, const CampaignFile& file) {
   return reduction.unknown > 0 ? kProblemFound : kWell;
 }
 
-int run(const Options& options) {
+int run_reduce(const ReduceOptions& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   return file.text("table.toml") ? reduce_table(options, file) : reduce_campaign(options, file);
 }
@@ -177,7 +177,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_reduce(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReduceOptions>();
   CLI::App* verb =
       app.add_subcommand("reduce", "Runs to calibrated thrusts, C_T and U, per run and per location");
   verb->footer(
@@ -196,7 +196,7 @@ void add_reduce(CLI::App& app, Work& work) {
                  "Compute the runs' statistics again from their raw data, and compare");
   verb->add_flag("--no-spectra", options->no_spectra, "With --from-raw: leave the spectra out");
   verb->add_flag("--json", options->json, "Print as JSON");
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_reduce(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

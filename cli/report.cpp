@@ -11,11 +11,11 @@
 namespace tunnelrig::cli {
 namespace {
 
-struct Options {
+struct ReportOptions {
   std::string db, out, model, terms, flights;
 };
 
-int run(const Options& options) {
+int run_report(const ReportOptions& options) {
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   const ReportSettings settings{.db = options.db,
                                 .program_version = program_version(),
@@ -39,7 +39,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_report(CLI::App& app, Work& work) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReportOptions>();
   CLI::App* verb =
       app.add_subcommand("report", "One self-contained page: maps, coefficients, health, provenance");
   verb->footer(
@@ -52,7 +52,7 @@ void add_report(CLI::App& app, Work& work) {
   verb->add_option("--flights", options->flights,
                    "flights.json of `tunnelrig fly --out`, for a section of its own");
   add_model_options(*verb, options->model, options->terms);
-  verb->callback([options, &work] { work = [options] { return run(*options); }; });
+  verb->callback([options, &work] { work = [options] { return run_report(*options); }; });
 }
 
 }  // namespace tunnelrig::cli

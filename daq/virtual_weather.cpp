@@ -10,15 +10,15 @@ namespace tunnelrig {
 namespace {
 
 constexpr double kDay_s = 86400;
-constexpr double kTwoPi = 2 * std::numbers::pi;
+constexpr double kFullTurn = 2 * std::numbers::pi;
 
 /// A sum of slow waves with random phases, of standard deviation 1.
 double fronts(double time_s, std::mt19937_64& engine) {
   constexpr std::array<double, 4> kPeriods_day = {2.3, 3.7, 5.9, 9.1};
-  std::uniform_real_distribution<double> phase(0, kTwoPi);
+  std::uniform_real_distribution<double> phase(0, kFullTurn);
   double sum = 0;
   for (const double period : kPeriods_day)
-    sum += std::sin(kTwoPi * time_s / (period * kDay_s) + phase(engine));
+    sum += std::sin(kFullTurn * time_s / (period * kDay_s) + phase(engine));
   return sum / std::sqrt(kPeriods_day.size() / 2.0);
 }
 
@@ -27,7 +27,7 @@ double fronts(double time_s, std::mt19937_64& engine) {
 Weather weather_at(double time_s, std::uint64_t seed) {
   std::mt19937_64 engine(seed ^ 0x77656174686572u);
   const double warmest_s = 15 * 3600;
-  const double day = std::cos(kTwoPi * (time_s - warmest_s) / kDay_s);
+  const double day = std::cos(kFullTurn * (time_s - warmest_s) / kDay_s);
   Weather weather;
   weather.air_pressure_Pa = 101325 + 450 * fronts(time_s, engine);
   weather.air_temperature_C = 21 + 2.5 * day + 1.8 * fronts(time_s, engine);

@@ -20,7 +20,7 @@ bool differ(double a, double b) { return std::abs(a - b) > 0.01 * b; }
 
 }  // namespace
 
-FlightSpace::FlightSpace(Tunnel shape, const Airframe& frame)
+FlightSpace::FlightSpace(FlightTunnel shape, const Airframe& frame)
     : tunnel(std::move(shape)),
       walls(corners_above(tunnel.section, tunnel.section.lowest().y())),
       floor_m(tunnel.section.lowest().y()),

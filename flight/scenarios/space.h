@@ -12,12 +12,12 @@
 namespace tunnelrig {
 
 struct FlightSpace {
-  Tunnel tunnel;
+  FlightTunnel tunnel;
   Walls walls;
   double floor_m = 0;  // of the lower edge in the cross-section's own frame; z_flight = z_section − floor_m
 
   /// Throws InputError where the vehicle is as wide as the tunnel or wider, or as high.
-  FlightSpace(Tunnel shape, const Airframe& frame);
+  FlightSpace(FlightTunnel shape, const Airframe& frame);
 
   /// (4.1), (4.2) for this tunnel's bounding box.
   SectionScale scale(const Airframe& frame) const;

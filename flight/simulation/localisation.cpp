@@ -7,7 +7,7 @@
 namespace tunnelrig {
 namespace {
 
-MatcherSettings matcher_settings(const Tunnel& tunnel, const LidarSettings& lidar) {
+MatcherSettings matcher_settings(const FlightTunnel& tunnel, const LidarSettings& lidar) {
   MatcherSettings settings;
   settings.layout = lidar.layout;
   if (tunnel.circle_diameter_m > 0) {

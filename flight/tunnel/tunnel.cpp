@@ -18,7 +18,7 @@ constexpr double kRailway_width_m = 4.5;
 constexpr double kRailway_height_m = 5.0;
 constexpr double kRailway_length_m = 100;
 
-constexpr double kLargest_m = 1000;
+constexpr double kLongest_m = 1000;
 
 int line_of(const toml::node& node) { return static_cast<int>(node.source().begin.line); }
 
@@ -54,7 +54,7 @@ const toml::node& require(const toml::table& table, std::string_view key, const 
 }
 
 double length(const toml::table& table, std::string_view key, const std::string& file) {
-  return number(require(table, key, file), key, file, 0.01, kLargest_m);
+  return number(require(table, key, file), key, file, 0.01, kLongest_m);
 }
 
 std::vector<SectionPoint> vertices(const toml::table& document, const std::string& file) {
@@ -67,8 +67,8 @@ std::vector<SectionPoint> vertices(const toml::table& document, const std::strin
     const toml::array* pair = item.as_array();
     if (pair == nullptr || pair->size() != 2)
       throw InputError::at(file, line_of(item), "vertex {} must be [y, z]", result.size() + 1);
-    result.emplace_back(number((*pair)[0], "y", file, -kLargest_m, kLargest_m),
-                        number((*pair)[1], "z", file, -kLargest_m, kLargest_m));
+    result.emplace_back(number((*pair)[0], "y", file, -kLongest_m, kLongest_m),
+                        number((*pair)[1], "z", file, -kLongest_m, kLongest_m));
   }
   return result;
 }
@@ -112,10 +112,10 @@ std::vector<SectionFeature> features(const toml::table& document, const std::str
     if (table == nullptr) throw InputError::at(file, line_of(item), "features are written as [[feature]]");
     check_keys(*table, {"edge", "from_m", "to_m", "inward_m"}, file);
     const auto value = [&](std::string_view key, double lowest) {
-      return number(require(*table, key, file), key, file, lowest, kLargest_m);
+      return number(require(*table, key, file), key, file, lowest, kLongest_m);
     };
     result.push_back({static_cast<std::size_t>(value("edge", 0)), value("from_m", 0), value("to_m", 0),
-                      value("inward_m", -kLargest_m)});
+                      value("inward_m", -kLongest_m)});
   }
   return result;
 }
@@ -128,7 +128,7 @@ std::string text(const toml::table& document, std::string_view key, const std::s
 
 }  // namespace
 
-Tunnel parse_tunnel(const std::string& toml, const std::string& file) {
+FlightTunnel parse_tunnel(const std::string& toml, const std::string& file) {
   const toml::table document = parse_document(toml, file);
   check_keys(document,
              {"name", "shape", "length_m", "width_m", "height_m", "wall_height_m", "diameter_m", "segments",
@@ -140,9 +140,11 @@ Tunnel parse_tunnel(const std::string& toml, const std::string& file) {
           shape == "circle" ? length(document, "diameter_m", file) : 0};
 }
 
-Tunnel read_tunnel(const std::filesystem::path& path) { return parse_tunnel(read_text(path), path.string()); }
+FlightTunnel read_tunnel(const std::filesystem::path& path) {
+  return parse_tunnel(read_text(path), path.string());
+}
 
-Tunnel tunnel_from(const std::string& name_or_file) {
+FlightTunnel tunnel_from(const std::string& name_or_file) {
   if (name_or_file == "1.5") return {"1.5", CrossSection(box_outline(1.5, 1.5)), 2.5};
   if (name_or_file == "2.4") return {"2.4", CrossSection(box_outline(2.35, 2.39)), 6.06};
   if (name_or_file == "railway")

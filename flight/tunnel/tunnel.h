@@ -8,7 +8,7 @@
 
 namespace tunnelrig {
 
-struct Tunnel {
+struct FlightTunnel {
   std::string name;
   CrossSection section;
   double length_m = 0;
@@ -17,10 +17,10 @@ struct Tunnel {
 
 /// "1.5" (1.5 × 1.5 × 2.5 m), "2.4" (2.35 × 2.39 × 6.06 m) and "railway" (4.5 × 5.0 m, half-circular arch) of
 /// the thesis, or else the file of that name. Throws InputError for neither.
-Tunnel tunnel_from(const std::string& name_or_file);
+FlightTunnel tunnel_from(const std::string& name_or_file);
 
 /// Throws InputError naming file, line and the rule broken.
-Tunnel parse_tunnel(const std::string& toml, const std::string& file);
-Tunnel read_tunnel(const std::filesystem::path& path);
+FlightTunnel parse_tunnel(const std::string& toml, const std::string& file);
+FlightTunnel read_tunnel(const std::filesystem::path& path);
 
 }  // namespace tunnelrig

@@ -49,7 +49,7 @@ double microseconds(std::chrono::steady_clock::duration duration) {
 }
 
 Outcome run(const Task& task, std::uint64_t seed) {
-  const Tunnel tunnel = tunnel_from(task.tunnel);
+  const FlightTunnel tunnel = tunnel_from(task.tunnel);
   ScanMatcher matcher(tunnel.section, task.settings);
   SimulatedLidar lidar(
       tunnel.section,

@@ -19,7 +19,7 @@ std::string wrong(const std::string& toml) {
 TEST(Tunnel, ThesisTunnelsByName) {
   EXPECT_DOUBLE_EQ(tunnel_from("1.5").section.width_m(), 1.5);
   EXPECT_DOUBLE_EQ(tunnel_from("2.4").section.height_m(), 2.39);
-  const Tunnel railway = tunnel_from("railway");
+  const FlightTunnel railway = tunnel_from("railway");
   EXPECT_NEAR(railway.section.width_m(), 6.3 * 0.715, 0.01);
   EXPECT_NEAR(railway.section.height_m(), 16.7 * 0.3, 0.02);
   EXPECT_THAT(message_of([] { tunnel_from("3.7"); }), HasSubstr("no such tunnel"));
@@ -42,7 +42,7 @@ TEST(Tunnel, EveryShapeOfTheFileFormat) {
 }
 
 TEST(Tunnel, FeaturesLeaveTheOriginWhereItIs) {
-  const Tunnel tunnel = parse_tunnel(
+  const FlightTunnel tunnel = parse_tunnel(
       "name = \"bay\"\nlength_m = 10\nshape = \"square\"\nwidth_m = 2\n"
       "[[feature]]\nedge = 1\nfrom_m = 0.5\nto_m = 1.5\ninward_m = -0.5\n",
       "t.toml");

@@ -46,7 +46,7 @@ DenseFit best_of(const Observations& o, const VectorXd& y, const MatrixXd& colum
   return best;
 }
 
-MatrixXd normal(Index rows, Index columns, std::mt19937_64& random) {
+MatrixXd normal_matrix(Index rows, Index columns, std::mt19937_64& random) {
   std::normal_distribution<double> draw;
   return MatrixXd::NullaryExpr(rows, columns, [&] { return draw(random); });
 }
@@ -80,7 +80,7 @@ TEST(Likelihood, RatioOfACandidateIsTheDenseOne) {
   for (int i = 0; i < 60; ++i) {
     Observations o =
         test::simulate({.runs_of_block = {3, 6, 4, 8, 5, 2, 7, 5}, .session_ratio = 0.2 * (i % 12)}, random);
-    MatrixXd column = normal(o.rows(), 1, random);
+    MatrixXd column = normal_matrix(o.rows(), 1, random);
     if (i % 2 == 0)  // constant within sessions
       for (Index row = 0; row < o.rows(); ++row)
         column(row) = std::cos(1.0 + o.block[static_cast<std::size_t>(row)]);
@@ -102,7 +102,7 @@ TEST(Likelihood, RatioOfACandidateIsTheDenseOne) {
 TEST(Likelihood, AdoptedColumnsStayIn) {
   std::mt19937_64 random(test::seed() + 2);
   const Observations o = test::simulate({.session_ratio = 0}, random);
-  const MatrixXd columns = normal(o.rows(), 2, random);
+  const MatrixXd columns = normal_matrix(o.rows(), 2, random);
   const MixedModel model(o, test::all_rows(o), {});
   const Components first = {columns.col(0)}, second = {columns.col(1)};
   const CandidateScan scan(model, {first}, {{.columns = {second}}});
@@ -119,7 +119,7 @@ TEST(Likelihood, EvidenceIsTheTailOfFisher) {
   std::mt19937_64 random(test::seed() + 3);
   Observations o = test::simulate({.session_ratio = 0}, random);
   o.blocks_are_rows = true;  // no session variance: ordinary least squares
-  const MatrixXd column = normal(o.rows(), 1, random);
+  const MatrixXd column = normal_matrix(o.rows(), 1, random);
   test::set_y(o, o.y + 0.0004 * column);
   const MixedModel model(o, test::all_rows(o));
   const CandidateFit fit = CandidateScan(model, {}, {{.columns = {{column}}}}).fit({o.y})[0];
@@ -140,7 +140,7 @@ TEST(Likelihood, EvidenceIsTheTailOfFisher) {
 TEST(Likelihood, TheWrongSignIsNoEvidence) {
   std::mt19937_64 random(test::seed() + 4);
   Observations o = test::simulate({}, random);
-  const MatrixXd column = normal(o.rows(), 1, random);
+  const MatrixXd column = normal_matrix(o.rows(), 1, random);
   test::set_y(o, o.y - 0.01 * column);
   const MixedModel model(o, test::all_rows(o));
   const auto fits =
@@ -157,7 +157,7 @@ TEST(Likelihood, FourRotorsFindWhatOneRotorHas) {
   std::mt19937_64 random(test::seed() + 5);
   Observations o = test::simulate({.channels = 4}, random);
   MatrixXd one = MatrixXd::Zero(o.rows(), 4);
-  one.col(2) = normal(o.rows(), 1, random);
+  one.col(2) = normal_matrix(o.rows(), 1, random);
   const MatrixXd all = one.col(2).replicate(1, 4);
   test::set_y(o, o.y + 0.003 * one);
   const MixedModel model(o, test::all_rows(o));
