@@ -6,7 +6,7 @@
 namespace tunnelrig {
 namespace {
 
-constexpr float kLeast_share = 0.15F;  // of the highest cell
+constexpr float kLeast_height = 0.15F;  // of the highest cell
 constexpr std::size_t kMost_cells = 48;
 
 }  // namespace
@@ -51,7 +51,7 @@ void HoughColumn::keep_highest_cells(std::span<const SectionPoint> reference) {
   std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return value(a) > value(b); });
   const float most = value(order.front());
   for (const std::int32_t cell : order) {
-    if (start_.size() == kMost_cells || value(cell) < kLeast_share * most || value(cell) == 0) break;
+    if (start_.size() == kMost_cells || value(cell) < kLeast_height * most || value(cell) == 0) break;
     start_.push_back(cell);
     weight_.push_back(value(cell) / static_cast<float>(reference.size()));
   }
