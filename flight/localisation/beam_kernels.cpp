@@ -1,5 +1,7 @@
 #include "flight/localisation/beam_kernels.h"
 
+#include <cstring>
+
 #if defined(__x86_64__)
 #define TUNNELRIG_X86 1
 #endif
@@ -14,13 +16,11 @@ namespace {
 struct Four {
   static constexpr std::size_t kWidth = 4;
   using Floats = float __attribute__((vector_size(16), may_alias));
-  using Loose = float __attribute__((vector_size(16), aligned(4), may_alias));  // at any address
   using Ints = std::int32_t __attribute__((vector_size(16), may_alias));
 };
 struct Eight {
   static constexpr std::size_t kWidth = 8;
   using Floats = float __attribute__((vector_size(32), may_alias));
-  using Loose = float __attribute__((vector_size(32), aligned(4), may_alias));  // at any address
   using Ints = std::int32_t __attribute__((vector_size(32), may_alias));
 };
 
@@ -32,10 +32,17 @@ constexpr float kFar_m = 1e7F;
 template <typename Register>
 struct Body {
   using Floats = typename Register::Floats;
-  using Loose = typename Register::Loose;
   using Ints = typename Register::Ints;
   static constexpr std::size_t kWidth = Register::kWidth;
   static constexpr std::size_t kParts = kSums / kWidth;
+
+  /// From and to any address.
+  TUNNELRIG_BODY Floats get(const float* from) {
+    Floats value;
+    std::memcpy(&value, from, sizeof value);
+    return value;
+  }
+  TUNNELRIG_BODY void put(float* to, Floats value) { std::memcpy(to, &value, sizeof value); }
 
   /// In an order that does not depend on the width.
   TUNNELRIG_BODY float total(const Floats* parts) {
@@ -90,15 +97,12 @@ struct Body {
                           float wall_z) {
     std::size_t i = first;
     for (; i + kWidth <= last; i += kWidth) {
-      const Floats value = wall_y * *reinterpret_cast<const Loose*>(beams.along_y + i) +
-                           wall_z * *reinterpret_cast<const Loose*>(beams.along_z + i);
-      const Floats before = *reinterpret_cast<const Loose*>(beams.inverse + i);
+      const Floats value = wall_y * get(beams.along_y + i) + wall_z * get(beams.along_z + i);
+      const Floats before = get(beams.inverse + i);
       const Ints nearer = value > before;
-      *reinterpret_cast<Loose*>(beams.inverse + i) = nearer ? value : before;
-      *reinterpret_cast<Loose*>(beams.wall_y + i) =
-          nearer ? Floats{} + wall_y : *reinterpret_cast<const Loose*>(beams.wall_y + i);
-      *reinterpret_cast<Loose*>(beams.wall_z + i) =
-          nearer ? Floats{} + wall_z : *reinterpret_cast<const Loose*>(beams.wall_z + i);
+      put(beams.inverse + i, nearer ? value : before);
+      put(beams.wall_y + i, nearer ? Floats{} + wall_y : get(beams.wall_y + i));
+      put(beams.wall_z + i, nearer ? Floats{} + wall_z : get(beams.wall_z + i));
     }
     for (; i < last; ++i) {
       const float value = wall_y * beams.along_y[i] + wall_z * beams.along_z[i];
@@ -210,8 +214,8 @@ struct Body {
       Floats y = {};
       Floats z = {};
       for (std::size_t apart = 1; apart <= Evidence::kNeighbours; ++apart) {
-        y += *reinterpret_cast<const Loose*>(beams.y + i + apart);
-        z += *reinterpret_cast<const Loose*>(beams.z + i + apart);
+        y += get(beams.y + i + apart);
+        z += get(beams.z + i + apart);
       }
       shared_y[part] += *reinterpret_cast<const Floats*>(beams.y + i) * y;
       shared_z[part] += *reinterpret_cast<const Floats*>(beams.z + i) * z;
@@ -238,9 +242,9 @@ struct Body {
     for (; i + kWidth <= size; i += kWidth) {
       Floats sum = {};
       for (std::size_t j = 0; j < taps; ++j) {
-        sum += tap[j] * *reinterpret_cast<const Loose*>(in + i + j);
+        sum += tap[j] * get(in + i + j);
       }
-      *reinterpret_cast<Loose*>(out + i) = sum;
+      put(out + i, sum);
     }
     for (; i < size; ++i) {
       out[i] = 0;
@@ -252,7 +256,7 @@ struct Body {
     Floats most = {};
     std::size_t i = 0;
     for (; i + kWidth <= size; i += kWidth) {
-      const Floats value = *reinterpret_cast<const Loose*>(in + i);
+      const Floats value = get(in + i);
       most = value > most ? value : most;
     }
     float result = 0;
