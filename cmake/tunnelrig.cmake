@@ -25,6 +25,11 @@ macro(tunnelrig_optimise_less)
   add_compile_options($<$<CONFIG:Release>:-O1>)
 endmacro()
 
+# For folders whose loops pass over every sample, or run in the control loop: wider vectors, deeper inlining.
+macro(tunnelrig_optimise_more)
+  add_compile_options($<$<CONFIG:Release>:-O3>)
+endmacro()
+
 # For folders full of Eigen: checks of every access that AddressSanitizer makes as well would triple the time that they take to
 # compile, and Eigen steps along the null pointer of an empty matrix. Folders that read bytes from outside keep them.
 macro(tunnelrig_fewer_checks)

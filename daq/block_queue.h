@@ -29,12 +29,14 @@ class BlockQueue {
 
   /// False where the queue has been closed: the reader then ends.
   bool push(Block block) {
-    std::unique_lock lock(mutex_);
-    room_.wait(lock, [&] { return closed_ || bytes_ < limit_bytes_; });
-    if (closed_) return false;
-    bytes_ += block.bytes.size();
-    blocks_.push_back(std::move(block));
-    filled_.notify_one();
+    {
+      std::unique_lock lock(mutex_);
+      room_.wait(lock, [&] { return closed_ || bytes_ < limit_bytes_; });
+      if (closed_) return false;
+      bytes_ += block.bytes.size();
+      blocks_.push_back(std::move(block));
+    }
+    filled_.notify_one();  // who wakes finds the mutex free
     return true;
   }
 

@@ -35,10 +35,10 @@ double VirtualBoard::board_time_s() const {
 }
 
 /// In real time a packet exists when its last frame has been sampled.
-bool VirtualBoard::due() const {
-  if (settings_.pace <= 0) return true;
+double VirtualBoard::due_in_s() const {
+  if (settings_.pace <= 0) return 0;
   const double ready_s = static_cast<double>(clock_frames_ + kFramesPerPacket) / settings_.frame_rate_hz;
-  return (steady_seconds() - started_s_) * settings_.pace >= ready_s;
+  return started_s_ + ready_s / settings_.pace - steady_seconds();
 }
 
 bool VirtualBoard::chance(double probability) {
@@ -136,11 +136,13 @@ ReadResult VirtualBoard::read(std::span<std::byte> buffer, std::chrono::millisec
   const double board_deadline_s = board_time_s() + patience_s;
   while (arrived_.size() - read_ < buffer.size()) {
     if (settings_.pace <= 0 && board_time_s() >= board_deadline_s) break;
-    if (due()) {
+    const double wait_s = due_in_s();
+    if (wait_s <= 0) {
       step();
     } else {
-      if (read_ < arrived_.size() || steady_seconds() >= deadline_s) break;
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      const double left_s = deadline_s - steady_seconds();
+      if (read_ < arrived_.size() || left_s <= 0) break;
+      std::this_thread::sleep_for(std::chrono::duration<double>(std::min(wait_s, left_s)));
     }
   }
   const std::size_t size = std::min(buffer.size(), arrived_.size() - read_);

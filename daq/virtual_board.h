@@ -37,7 +37,7 @@ class VirtualBoard : public PacketSource {
 
  private:
   double board_time_s() const;
-  bool due() const;
+  double due_in_s() const;  // of the next packet; not above 0: now
   bool rebooting() const;
   bool link_open() const;
   void step();

@@ -31,7 +31,10 @@ Database::Database(const std::string& path, int flags) {
   sqlite3_busy_timeout(handle_, 5000);
 }
 
-Database::~Database() { sqlite3_close_v2(handle_); }
+Database::~Database() {
+  for (const auto& [sql, statement] : compiled_) sqlite3_finalize(statement);
+  sqlite3_close_v2(handle_);
+}
 
 void Database::execute(const std::string& sql) const {
   if (sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) fail(handle_, SQLITE_ERROR);
@@ -49,16 +52,36 @@ std::int64_t Database::scalar_integer(const std::string& sql) const {
 
 std::int64_t Database::last_id() const { return sqlite3_last_insert_rowid(handle_); }
 
-Statement::Statement(const Database& database, std::string_view sql) {
-  const int code = sqlite3_prepare_v3(database.handle(), sql.data(), static_cast<int>(sql.size()),
-                                      SQLITE_PREPARE_PERSISTENT, &statement_, nullptr);
-  if (code != SQLITE_OK) fail(database.handle(), code);
+sqlite3_stmt* Database::take(std::string_view sql) const {
+  if (const auto known = compiled_.find(std::string(sql)); known != compiled_.end()) {
+    sqlite3_stmt* statement = known->second;
+    compiled_.erase(known);
+    return statement;
+  }
+  sqlite3_stmt* statement = nullptr;
+  const int code = sqlite3_prepare_v3(handle_, sql.data(), static_cast<int>(sql.size()),
+                                      SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
+  if (code != SQLITE_OK) fail(handle_, code);
+  return statement;
 }
 
-Statement::~Statement() { sqlite3_finalize(statement_); }
+void Database::give_back(sqlite3_stmt* statement) const {
+  constexpr std::size_t kMostKept = 64;
+  sqlite3_reset(statement);
+  sqlite3_clear_bindings(statement);
+  if (compiled_.size() >= kMostKept || !compiled_.emplace(sqlite3_sql(statement), statement).second)
+    sqlite3_finalize(statement);
+}
+
+Statement::Statement(const Database& database, std::string_view sql)
+    : database_(&database), statement_(database.take(sql)) {}
+
+Statement::~Statement() {
+  if (statement_ != nullptr) database_->give_back(statement_);
+}
 
 Statement::Statement(Statement&& other) noexcept
-    : statement_(std::exchange(other.statement_, nullptr)), next_(other.next_) {}
+    : database_(other.database_), statement_(std::exchange(other.statement_, nullptr)), next_(other.next_) {}
 
 void Statement::check(int code) const {
   if (code != SQLITE_OK) fail(sqlite3_db_handle(statement_), code);
@@ -128,7 +151,7 @@ std::span<const std::byte> Statement::blob(int column) const {
 }
 
 Transaction::Transaction(const Database& database) : database_(database) {
-  database_.execute("BEGIN IMMEDIATE");
+  Statement(database_, "BEGIN IMMEDIATE").run();
 }
 
 Transaction::~Transaction() {
@@ -138,7 +161,7 @@ Transaction::~Transaction() {
 }
 
 void Transaction::commit() {
-  database_.execute("COMMIT");
+  Statement(database_, "COMMIT").run();
   open_ = false;
 }
 

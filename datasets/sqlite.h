@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 
 #include <sqlite3.h>
 
@@ -15,7 +16,8 @@ namespace tunnelrig {
 
 class Database;
 
-/// A prepared statement: bind in order, step, read columns in order. Reusable after reset.
+/// A prepared statement: bind in order, step, read columns in order. Reusable after reset. The connection
+/// keeps it compiled for the next one with the same text.
 class Statement {
  public:
   Statement(const Database& database, std::string_view sql);
@@ -44,6 +46,7 @@ class Statement {
  private:
   void check(int code) const;
 
+  const Database* database_ = nullptr;
   sqlite3_stmt* statement_ = nullptr;
   int next_ = 1;
 };
@@ -63,7 +66,12 @@ class Database {
   sqlite3* handle() const { return handle_; }
 
  private:
+  friend class Statement;
+  sqlite3_stmt* take(std::string_view sql) const;
+  void give_back(sqlite3_stmt* statement) const;
+
   sqlite3* handle_ = nullptr;
+  mutable std::unordered_map<std::string, sqlite3_stmt*> compiled_;  // those that nobody uses now
 };
 
 /// BEGIN IMMEDIATE … COMMIT; rolled back unless committed.
