@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <deque>
 #include <fstream>
 #include <future>
+#include <memory>
 #include <system_error>
 
 #include <unistd.h>
@@ -154,30 +156,69 @@ void play(std::span<const std::byte> data, std::size_t frame_size, std::span<con
   sink.frames(data.subspan(at * frame_size));
 }
 
-/// Stores one raw run; its statistics are computed beside on another core.
-void import_raw_run(CampaignFile& file, const fs::path& folder, const CampaignInfo& info, const Run& run,
-                    const ImportOptions& options, ImportSummary& summary) {
-  const fs::path path = raw_path(folder, run);
-  const NpyFile npy(path);
-  check_samples(npy, info, run);
-  const std::vector<Gap> gaps = read_gaps(gaps_path(path), npy.frames());
-  const RawFormat format = npy.format();
+/// Stores raw runs one after the other; the statistics of the last few are computed meanwhile on other cores.
+class RawImport {
+ public:
+  RawImport(CampaignFile& file, fs::path folder, const CampaignInfo& info, const ImportOptions& options,
+            ImportSummary& summary)
+      : file_(file), folder_(std::move(folder)), info_(info), options_(options), summary_(summary) {}
 
-  auto summarizer = options.summarizer(info, format);
-  auto summed =
-      std::async(std::launch::async, [&] { play(npy.data(), format.frame_size(), gaps, *summarizer); });
-  const auto chunk_frames = static_cast<std::size_t>(kChunk_s * info.daq.sample_rate_hz);
-  RawWriter writer(file, run.run, format, chunk_frames);
-  play(npy.data(), format.frame_size(), gaps, writer);
-  const std::string hash = writer.finish(RunState::kComplete, {});
-  summed.get();
-  const RunStatistics statistics = summarizer->finish(hash);
-  check_statistics(statistics, info, format, run, options.allow_stuck);
-  store_statistics(file, writer.id(), statistics);
-  summary.raw_runs += 1;
-  summary.frames += npy.frames();
-  summary.raw_bytes += npy.data().size();
-}
+  void add(const Run& run) {
+    auto raw = std::make_unique<RunInWork>(run, raw_path(folder_, run));
+    check_samples(raw->npy, info_, run);
+    raw->gaps = read_gaps(gaps_path(raw_path(folder_, run)), raw->npy.frames());
+    const RawFormat format = raw->npy.format();
+    raw->summarizer = options_.summarizer(info_, format);
+    raw->statistics = std::async(std::launch::async, [&work = *raw, frame = format.frame_size()] {
+      play(work.npy.data(), frame, work.gaps, *work.summarizer);
+      return work.summarizer->finish("");
+    });
+    RawWriter writer(file_, run.run, format, static_cast<std::size_t>(kChunk_s * info_.daq.sample_rate_hz));
+    play(raw->npy.data(), format.frame_size(), raw->gaps, writer);
+    raw->hash = writer.finish(RunState::kComplete, {});
+    raw->id = writer.id();
+    in_work_.push_back(std::move(raw));
+    if (in_work_.size() > kMostInWork) settle_oldest();
+  }
+
+  void finish() {
+    while (!in_work_.empty()) settle_oldest();
+  }
+
+ private:
+  static constexpr std::size_t kMostInWork = 2;
+
+  struct RunInWork {
+    RunInWork(const Run& planned, const fs::path& path) : run(planned), npy(path) {}
+
+    Run run;
+    NpyFile npy;
+    std::vector<Gap> gaps;
+    std::unique_ptr<RunSummarizer> summarizer;
+    std::string hash;
+    std::int64_t id = 0;
+    std::future<RunStatistics> statistics;  // last: its thread, which uses the others, ends first
+  };
+
+  void settle_oldest() {
+    const std::unique_ptr<RunInWork> raw = std::move(in_work_.front());
+    in_work_.pop_front();
+    RunStatistics statistics = raw->statistics.get();
+    statistics.hash = raw->hash;
+    check_statistics(statistics, info_, raw->npy.format(), raw->run, options_.allow_stuck);
+    store_statistics(file_, raw->id, statistics);
+    summary_.raw_runs += 1;
+    summary_.frames += raw->npy.frames();
+    summary_.raw_bytes += raw->npy.data().size();
+  }
+
+  CampaignFile& file_;
+  fs::path folder_;
+  const CampaignInfo& info_;
+  const ImportOptions& options_;
+  ImportSummary& summary_;
+  std::deque<std::unique_ptr<RunInWork>> in_work_;
+};
 
 /// Writes a stored run as .npy while it is read.
 class NpySink : public FrameSink {
@@ -248,10 +289,12 @@ ImportSummary import_campaign_folder(const fs::path& folder, const fs::path& fil
   campaign.set_sheet("runs", text.runs);
   ImportSummary summary{.runs = text.parsed_runs.size()};
   std::size_t done = 0;
+  RawImport raw(campaign, folder, text.info, options, summary);
   for (const Run& run : text.parsed_runs) {
-    if (!run.raw.empty()) import_raw_run(campaign, folder, text.info, run, options, summary);
+    if (!run.raw.empty()) raw.add(run);
     if (options.progress) options.progress(++done, text.parsed_runs.size());
   }
+  raw.finish();
   staged.publish();
   return summary;
 }
