@@ -82,7 +82,7 @@ std::vector<FlightLog> identification_flights(FlightTask task, const std::string
 
 /// Flies one scenario; `gains` and `map` are shared by all.
 FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, const NamedMap& map,
-                           const GainTable& gains) {
+                           const GainTable& gains, const Processes& processes) {
   const Airframe frame;
   const FlightSpace space(tunnel_from(one.tunnel), frame);
   const Scenario scenario = scenario_from(one.scenario, space, frame);
@@ -90,6 +90,7 @@ FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, c
       .space = &space, .scenario = &scenario, .map = &map.map, .believed = frame, .hidden = options.hidden};
   task.runs = options.runs;
   task.workers = options.workers;
+  task.processes = &processes;
   task.seed = options.seed;
   if (options.position == "given") {
     task.localisation.reset();
@@ -143,7 +144,18 @@ int tune_all(const FlyOptions& options) {
   return kWell;
 }
 
-int run_fly(const FlyOptions& options) {
+/// Of several processes the first one speaks and writes; the others only fly.
+FlyOptions quiet_options(FlyOptions options) {
+  if (std::freopen("/dev/null", "w", stdout) == nullptr || std::freopen("/dev/null", "w", stderr) == nullptr)
+    throw StorageError("/dev/null: cannot be opened", false);
+  options.out.clear();
+  options.json.clear();
+  return options;
+}
+
+int run_fly(const FlyOptions& given) {
+  const Processes processes;
+  const FlyOptions options = processes.rank() > 0 ? quiet_options(given) : given;
   options.hidden.validate();
   if (options.position != "lidar" && options.position != "given")
     throw InputError(fmt::format("--position {}: must be lidar or given", options.position));
@@ -157,7 +169,7 @@ int run_fly(const FlyOptions& options) {
   std::vector<FlownScenario> flown;
   fmt::print("SIMULATED flights; map: {}\n\n", map.name);
   for (const PlaceAndPath& one : wanted) {
-    flown.push_back(fly_scenario(options, one, map, gains));
+    flown.push_back(fly_scenario(options, one, map, gains, processes));
     print_flown(flown.back());
   }
   if (programme) print_beside_thesis(flown);

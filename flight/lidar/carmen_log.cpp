@@ -72,7 +72,7 @@ CarmenScan flaser(Words words, const std::string& file, int line) {
 
 }  // namespace
 
-std::vector<CarmenScan> parse_carmen_log(std::string_view text, const std::string& file) {
+std::vector<CarmenScan> parse_carmen_log(std::string_view text, const std::string& file, LogTime time) {
   std::vector<CarmenScan> scans;
   int number = 0;
   while (!text.empty()) {
@@ -80,13 +80,20 @@ std::vector<CarmenScan> parse_carmen_log(std::string_view text, const std::strin
     text.remove_prefix(std::min(text.size(), line.size() + 1));
     ++number;
     Words words(line, file, number);
-    if (words.next() == "FLASER") scans.push_back(flaser(words, file, number));
+    if (words.next() != "FLASER") continue;
+    scans.push_back(flaser(words, file, number));
+    if (scans.size() < 2 || time == LogTime::kAsLogged) continue;
+    const CarmenScan& before = scans[scans.size() - 2];
+    if (scans.back().time_s < before.time_s)
+      throw InputError::at(file, number,
+                           "FLASER: time {:.3f} s is before that of line {}, {:.3f} s: time goes forwards",
+                           scans.back().time_s, before.line, before.time_s);
   }
   return scans;
 }
 
-std::vector<CarmenScan> read_carmen_log(const std::filesystem::path& path) {
-  return parse_carmen_log(read_text(path), path.string());
+std::vector<CarmenScan> read_carmen_log(const std::filesystem::path& path, LogTime time) {
+  return parse_carmen_log(read_text(path), path.string(), time);
 }
 
 BeamLayout carmen_layout(std::size_t beams) {

@@ -26,12 +26,16 @@ struct CarmenScan {
   int line = 0;
 };
 
+enum class LogTime { kForwards, kAsLogged };
+
 /// The FLASER lines of a log; comments, other messages and empty lines are passed over. Throws InputError
-/// naming file and line for a FLASER line that is cut short or holds something else than numbers.
-std::vector<CarmenScan> parse_carmen_log(std::string_view text, const std::string& file);
+/// naming file and line for a FLASER line that is cut short or holds something else than numbers, and for one
+/// that is older than the one before (some published logs have such lines: kAsLogged takes them).
+std::vector<CarmenScan> parse_carmen_log(std::string_view text, const std::string& file,
+                                         LogTime time = LogTime::kForwards);
 
 /// Reads a plain log, not a compressed one.
-std::vector<CarmenScan> read_carmen_log(const std::filesystem::path& path);
+std::vector<CarmenScan> read_carmen_log(const std::filesystem::path& path, LogTime time = LogTime::kForwards);
 
 /// Beams of a CARMEN scan of n ranges: 180° in n steps, half a step from either end where n is even (SICK:
 /// 180 or 360 beams), from end to end where it is odd (181, 361). Angles are from the right, as BeamLayout's

@@ -1,6 +1,7 @@
 #include "flight/simulation/monte_carlo.h"
 
 #include "datasets/error.h"
+#include "flight/simulation/run_exchange.h"
 
 #include <atomic>
 #include <cmath>
@@ -159,21 +160,23 @@ Comparison fly_runs(const FlightTask& task, std::string_view controller, const G
   Comparison all{.controller = std::string(controller)};
   all.runs.resize(static_cast<std::size_t>(task.runs));
   std::array<AxisErrors, 2> pooled;
-  std::atomic<int> next = 0;
+  const int processes = task.processes != nullptr ? task.processes->count() : 1;
+  std::atomic<int> next = task.processes != nullptr ? task.processes->rank() : 0;
   std::mutex mutex;
   std::exception_ptr failed;
   int done = 0;
   const auto work = [&] {
     try {
       Worker worker(task, &map, controller, gains);
-      for (int run = next++; run < task.runs; run = next++) {
+      for (int run = next.fetch_add(processes); run < task.runs; run = next.fetch_add(processes)) {
         const FlightScore score = worker.run(run, nullptr);
         const std::scoped_lock lock(mutex);
         all.runs[static_cast<std::size_t>(run)] = result_of(score);
         // Counts do not care in which order they are added; everything else is added up in the order of the
         // runs.
         for (std::size_t i = 0; i < 2; ++i) pooled[i].add(score.tracking[i]);
-        if (progress) progress(++done);
+        done = std::min(done + processes, task.runs);
+        if (progress) progress(done);
       }
     } catch (...) {
       const std::scoped_lock lock(mutex);
@@ -188,6 +191,7 @@ Comparison fly_runs(const FlightTask& task, std::string_view controller, const G
   work();
   for (std::thread& thread : threads) thread.join();
   if (failed) std::rethrow_exception(failed);
+  if (task.processes != nullptr) exchange_runs(*task.processes, all.runs, pooled);
   all.p95_y_m = pooled[0].quantile_m(0.95);
   all.p95_z_m = pooled[1].quantile_m(0.95);
   summarise(all);

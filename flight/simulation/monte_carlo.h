@@ -5,6 +5,7 @@
 #include "flight/scenarios/scenario.h"
 #include "flight/simulation/flight.h"
 #include "flight/simulation/localisation.h"
+#include "flight/simulation/processes.h"
 
 #include <functional>
 #include <optional>
@@ -48,7 +49,8 @@ struct FlightTask {
   std::optional<LocalisationSettings> localisation =
       LocalisationSettings{};  // nothing: the position is given
   int runs = 20;
-  int workers = 0;  // 0: as many as there are cores
+  int workers = 0;                       // 0: as many as there are cores
+  const Processes* processes = nullptr;  // among which the runs are divided; null: this one alone
   std::uint64_t seed = 1;
 };
 
@@ -75,7 +77,9 @@ struct Comparison {
   double rejected_share = 0;              // of the matches
 };
 
-/// `progress` is called from one thread at a time with the number of finished runs.
+/// `progress` is called from one thread at a time with the number of finished runs (of all processes, as if
+/// they were equally fast). With several processes all of them must call this, with the same task; all get
+/// the whole result.
 Comparison fly_runs(const FlightTask& task, std::string_view controller, const GainTable& gains,
                     const std::function<void(int)>& progress = {});
 

@@ -125,6 +125,13 @@ TEST(CarmenLog, ReadsScansAndPassesOverTheRest) {
   EXPECT_EQ(scans[0].line, 4);
 }
 
+TEST(CarmenLog, RefusesTimeThatGoesBackwardsUnlessToldToTakeIt) {
+  const std::string text = "FLASER 2 1 2 0 0 0 0 0 0 7.5 host 1\n\nFLASER 2 1 2 0 0 0 0 0 0 7.4 host 1\n";
+  EXPECT_THAT(message_of([&] { parse_carmen_log(text, "x.log"); }),
+              AllOf(HasSubstr("x.log:3:"), HasSubstr("7.400 s is before that of line 1")));
+  EXPECT_EQ(parse_carmen_log(text, "x.log", LogTime::kAsLogged).size(), 2U);
+}
+
 TEST(CarmenLog, ErrorsNameTheLine) {
   const auto wrong = [](const std::string& text) {
     return message_of([&] { parse_carmen_log(text, "x.log"); });
