@@ -13,24 +13,6 @@ namespace {
 constexpr std::array<double, kMaxRotors> kSide = {1, -1, -1,
                                                   1};  // (5.1): right pair 1, 4 minus left pair 2, 3
 
-Tares tares_of(const CampaignData& data) {
-  std::vector<TareReading> readings;
-  for (const Run& run : data.runs) {
-    const auto statistics = data.statistics.find(run.run);
-    const auto raw = data.raw.find(run.run);
-    if (run.kind != RunKind::kTare || statistics == data.statistics.end() || raw == data.raw.end()) continue;
-    if (raw->second.state != RunState::kComplete) continue;
-    const double half_s = 0.5 * static_cast<double>(raw->second.frames) / data.info.daq.sample_rate_hz;
-    TareReading reading{.session = run.session, .time_s = run.start_s + half_s};
-    for (std::size_t c = 0; c < std::min<std::size_t>(statistics->second.channels.size(), kMaxRotors); ++c) {
-      reading.mean_V[c] = statistics->second.channels[c].mean_V;
-      reading.standard_error_V[c] = statistics->second.channels[c].standard_error_V;
-    }
-    readings.push_back(reading);
-  }
-  return Tares(std::move(readings));
-}
-
 double required(const Run& run, std::string_view column, std::string_view term) {
   if (const auto value = run.number(column)) return *value;
   throw InputError::at("runs.csv", run.line,
@@ -93,6 +75,24 @@ std::string why_not(const CampaignData& data, const Run& run, const RawRun& raw)
 }
 
 }  // namespace
+
+Tares tares_of(const CampaignData& data) {
+  std::vector<TareReading> readings;
+  for (const Run& run : data.runs) {
+    const auto statistics = data.statistics.find(run.run);
+    const auto raw = data.raw.find(run.run);
+    if (run.kind != RunKind::kTare || statistics == data.statistics.end() || raw == data.raw.end()) continue;
+    if (raw->second.state != RunState::kComplete) continue;
+    const double half_s = 0.5 * static_cast<double>(raw->second.frames) / data.info.daq.sample_rate_hz;
+    TareReading reading{.session = run.session, .time_s = run.start_s + half_s};
+    for (std::size_t c = 0; c < std::min<std::size_t>(statistics->second.channels.size(), kMaxRotors); ++c) {
+      reading.mean_V[c] = statistics->second.channels[c].mean_V;
+      reading.standard_error_V[c] = statistics->second.channels[c].standard_error_V;
+    }
+    readings.push_back(reading);
+  }
+  return Tares(std::move(readings));
+}
 
 std::string ModelTerms::name() const {
   std::string name;

@@ -83,6 +83,9 @@ struct Reduction {
 /// be, where raw runs have no calibration, and where a switched-on term lacks its measurement in some run.
 Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms);
 
+/// The tares of all sessions: complete runs with motors stopped, each at its middle.
+Tares tares_of(const CampaignData& data);
+
 /// Total, C_T and U with their errors, from the thrusts.
 void set_coefficients(const CampaignInfo& info, RunCoefficients& run);
 

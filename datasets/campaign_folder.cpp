@@ -2,6 +2,7 @@
 
 #include "datasets/error.h"
 #include "datasets/npy.h"
+#include "datasets/staged_output.h"
 #include "datasets/statistics_store.h"
 
 #include <algorithm>
@@ -12,8 +13,6 @@
 #include <future>
 #include <memory>
 #include <system_error>
-
-#include <unistd.h>
 
 namespace tunnelrig {
 namespace {
@@ -300,21 +299,9 @@ ImportSummary import_campaign_folder(const fs::path& folder, const fs::path& fil
 }
 
 void export_campaign_folder(const CampaignFile& file, const fs::path& folder, const Progress& progress) {
-  std::error_code error;
-  if (fs::exists(folder, error) && !(fs::is_directory(folder, error) && fs::is_empty(folder, error))) {
-    throw InputError::in(folder.string(), "exists and is not an empty folder; export never overwrites");
-  }
-  const fs::path staged = folder.string() + fmt::format(".{}.part", ::getpid());
-  fs::remove_all(staged, error);
-  fs::create_directories(staged, error);
-  if (error) throw InputError::in(folder.string(), "cannot be written: {}", error.message());
-  try {
-    write_folder(file, staged, progress);
-    fs::rename(staged, folder);
-  } catch (...) {
-    fs::remove_all(staged, error);
-    throw;
-  }
+  StagedOutput staged(folder, StagedOutput::Kind::kFolder);
+  write_folder(file, staged.path(), progress);
+  staged.publish();
 }
 
 }  // namespace tunnelrig

@@ -128,17 +128,24 @@ NpyFile::NpyFile(const std::filesystem::path& path) {
 NpyFile::~NpyFile() { ::munmap(map_, map_size_); }
 
 std::string format_npy_header(const RawFormat& format, std::uint64_t frames) {
-  std::string dict =
-      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}, {}), }}",
-                  kDescrs[static_cast<std::size_t>(format.type)].descr, frames, format.channels);
-  const std::size_t unpadded = kMagic.size() + 4 + dict.size() + 1;
+  const std::array<std::uint64_t, 2> shape = {frames, static_cast<std::uint64_t>(format.channels)};
+  const std::string_view descr = kDescrs[static_cast<std::size_t>(format.type)].descr;
+  return format_npy_header(fmt::format("'{}'", descr), shape);
+}
+
+std::string format_npy_header(std::string_view descr, std::span<const std::uint64_t> shape) {
+  std::string dict = fmt::format("{{'descr': {}, 'fortran_order': False, 'shape': ({}{}), }}", descr,
+                                 fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
+  constexpr std::size_t kLongest = 0xFFFF - 64;
+  const bool long_length = dict.size() > kLongest;  // as four bytes, not two
+  const std::size_t unpadded = kMagic.size() + (long_length ? 6 : 4) + dict.size() + 1;
   dict.append((64 - unpadded % 64) % 64, ' ');
   dict.push_back('\n');
   std::string out(kMagic);
-  out.push_back('\x01');
+  out.push_back(long_length ? '\x02' : '\x01');
   out.push_back('\0');
-  out.push_back(static_cast<char>(dict.size() & 0xFFu));
-  out.push_back(static_cast<char>(dict.size() >> 8));
+  for (std::size_t byte = 0; byte < (long_length ? 4u : 2u); ++byte)
+    out.push_back(static_cast<char>((dict.size() >> (8 * byte)) & 0xFFu));
   return out + dict;
 }
 

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace tunnelrig {
 
@@ -44,5 +45,9 @@ NpyHeader parse_npy_header(std::span<const std::byte> bytes, const std::string& 
 
 /// The bytes that stand before the samples in a file of this shape, a multiple of 64.
 std::string format_npy_header(const RawFormat& format, std::uint64_t frames);
+
+/// The same for any array in C order: `descr` is NumPy's, quotes included ("'<f8'", "[('run', '<U5')]").
+/// Format version 2.0 where the header is too long for 1.0.
+std::string format_npy_header(std::string_view descr, std::span<const std::uint64_t> shape);
 
 }  // namespace tunnelrig
