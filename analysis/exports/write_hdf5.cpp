@@ -58,11 +58,17 @@ std::vector<char> padded(const Texts& texts, std::size_t size) {
 class Hdf5Writer : public Writer {
  public:
   explicit Hdf5Writer(const std::filesystem::path& path) : name_(path.string()) {
+    // Everything is closed here. At exit the library would once more close what a full disk kept it from
+    // closing, and crash.
+    H5dont_atexit();
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures are said once, by us
     file_ = checked(H5Fcreate(name_.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
     scalar_ = checked(H5Screate(H5S_SCALAR), H5Sclose);
     creation_ = checked(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
     check(H5Pset_fill_time(creation_.id(), H5D_FILL_TIME_NEVER));
+    text_type_ = checked(H5Tcopy(H5T_C_S1), H5Tclose);
+    check(H5Tset_size(text_type_.id(), H5T_VARIABLE));
+    check(H5Tset_cset(text_type_.id(), H5T_CSET_UTF8));
     raw_ = new_group(file_, "raw");
   }
 
@@ -161,11 +167,12 @@ class Hdf5Writer : public Writer {
     return type;
   }
 
+  /// Of variable length, which h5py gives as str.
   void text_attribute(const Handle& where, const char* name, const std::string& text) const {
-    const Handle type = string_type(text.size(), is_ascii(text));
-    const Handle attribute =
-        checked(H5Acreate2(where.id(), name, type.id(), scalar_.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-    check(H5Awrite(attribute.id(), type.id(), text.c_str()));
+    const Handle attribute = checked(
+        H5Acreate2(where.id(), name, text_type_.id(), scalar_.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+    const char* value = text.c_str();
+    check(H5Awrite(attribute.id(), text_type_.id(), &value));
   }
 
   Handle new_dataset(const Handle& where, const std::string& name, const std::string& unit,
@@ -210,7 +217,7 @@ class Hdf5Writer : public Writer {
   }
 
   std::string name_;
-  Handle file_, scalar_, creation_, raw_;
+  Handle file_, scalar_, creation_, text_type_, raw_;
   std::vector<Series> series_;
   std::vector<Handle> datasets_;  // of the recording's series
   std::uint64_t done_ = 0;        // frames of it

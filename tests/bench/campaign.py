@@ -8,9 +8,10 @@ import sys
 import tempfile
 
 import measure
+import thesis_campaign
 
 program, scratch, rig = sys.argv[1], pathlib.Path(sys.argv[2]), os.path.abspath(sys.argv[3])
-folder, plan, log_db, db = (scratch / name for name in ("campaign", "plan.csv", "log.db", "campaign.db"))
+folder, db = (scratch / name for name in ("campaign", "campaign.db"))
 here = pathlib.Path(__file__).parent
 
 
@@ -18,14 +19,7 @@ def make():
     """Logs the campaign on the virtual rig and exports it, once."""
     if folder.exists():
         return
-    locations = scratch / "locations.csv"
-    labels = [f"H{h}V{v}" if (h, v) != (0, 0) else "OT" for h in range(6) for v in range(-3, 4)] + ["OS"]
-    locations.write_text("location\n" + "\n".join(labels) + "\n")
-    for path in (log_db, plan):
-        path.unlink(missing_ok=True)
-    subprocess.run([program, "plan", "--out", plan, "--locations", locations, "--anchor-every", "0"], check=True, stdout=subprocess.DEVNULL)
-    logged = measure.run([program, "log", "--db", log_db, "--plan", plan, "--speed", "max"])
-    print(f"logged on the virtual rig at max speed in {logged['wall_s']:.1f} s")
+    log_db = thesis_campaign.logged(program, scratch)
     subprocess.run([program, "export", "--db", log_db, folder], check=True, stdout=subprocess.DEVNULL)
 
 
