@@ -104,8 +104,10 @@ void add_models(const CampaignFile& file, const CampaignData& data, Contents& co
 }
 
 void say_what_calibration_gives(const CampaignData& data, const Parts& parts, Contents& contents) {
-  if (data.certificate || data.raw.empty()) return;
-  const char* reason = "there is no calibration yet; `tunnelrig calibrate` makes it";
+  if (data.certificate) return;
+  const char* reason = data.raw.empty() ? "the runs give thrusts, not voltages"
+                                        : "there is no calibration yet; `tunnelrig calibrate` makes it";
+  if (data.raw.empty() && parts.raw) contents.absent.push_back({"raw", reason});
   if (parts.thrusts) contents.absent.push_back({"thrusts", reason});
   if (parts.models) contents.absent.push_back({"calibration", reason});
 }
@@ -166,10 +168,6 @@ Parts parts_from_names(std::string_view names) {
     names = end == std::string_view::npos ? std::string_view() : names.substr(end + 1);
   }
   return parts;
-}
-
-Contents contents_of(const CampaignFile& file, const Settings& settings) {
-  return plan_of(file, settings).contents;
 }
 
 Exported export_campaign(const CampaignFile& file, const std::filesystem::path& target,

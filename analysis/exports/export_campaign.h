@@ -50,9 +50,6 @@ struct Exported {
 
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
-/// Everything that is exported but the frames themselves.
-Contents contents_of(const CampaignFile& file, const Settings& settings);
-
 /// Writes `target`, which must not exist (csv, npy: or be an empty folder): whole, or not at all. Recordings
 /// are streamed in blocks. What the campaign does not give is left out and named in the result. Throws
 /// InputError where the target cannot be taken, StorageError where the disk is full or raw data are damaged.

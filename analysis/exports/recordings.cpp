@@ -3,6 +3,7 @@
 #include "analysis/exports/tables.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <limits>
 
@@ -10,6 +11,8 @@ namespace tunnelrig::exports {
 namespace {
 
 constexpr std::size_t kBlockFrames = 1 << 16;
+
+static_assert(std::endian::native == std::endian::little, "blocks are passed on as they lie in memory");
 
 Element element_of(SampleType type) {
   switch (type) {

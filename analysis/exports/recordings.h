@@ -31,7 +31,7 @@ std::vector<RecordingSource> recording_sources(const CampaignFile& file, const C
                                                const std::map<std::string, std::string>& keys,
                                                std::vector<Absent>& absent);
 
-/// Reads a recording once and writes it block by block; memory does not grow with its length.
+/// Reads a recording once and hands it to the writer block by block; only a MATLAB file needs it whole.
 void stream_recording(const CampaignFile& file, const RecordingSource& source, Writer& writer);
 
 }  // namespace tunnelrig::exports

@@ -83,9 +83,24 @@ def odd(tunnelrig, folder):
     program(tunnelrig, "calibrate", "--db", folder / "odd.db", expected=(0, 1))
 
 
+def thrusts(tunnelrig, folder):
+    """Runs that give thrusts: nothing was recorded, nothing is to be calibrated."""
+    source = folder / "thrusts"
+    source.mkdir()
+    toml = (folder / "odd" / "campaign.toml").read_text()
+    (source / "campaign.toml").write_text(toml.replace("Übung, größer", "thrusts"))
+    (source / "calibration.csv").write_text("cell,applied_force_N,voltage_V\n")
+    rows = [f"R{i},{place},{i},S{i % 2},2026-03-02T08:{i:02}:00Z,,20,{7 + 0.01 * i},7.1,7.2,{7.3 - 0.01 * i}" for i, place in enumerate(["OT", "OS"] * 3)]
+    (source / "runs.csv").write_text(
+        "run,location,repeat,session,start_utc,raw,air_temperature_C,thrust_1_N,thrust_2_N,thrust_3_N,thrust_4_N\n" + "\n".join(rows) + "\n"
+    )
+    program(tunnelrig, "import", source, "--db", folder / "thrusts.db")
+
+
 if __name__ == "__main__":
     where = pathlib.Path(sys.argv[2])
     subprocess.run(["rm", "-rf", where], check=True)
     where.mkdir(parents=True)
     rig(sys.argv[1], where)
     odd(sys.argv[1], where)
+    thrusts(sys.argv[1], where)

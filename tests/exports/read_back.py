@@ -217,6 +217,16 @@ class ReadBack(Case):
         self.check_dictionary(out)
         self.assertEqual(export(CAMPAIGNS / "uncalibrated.db", CASE, self.here / "b", "--parts", "maps").returncode, 1, "asked for by name")
 
+    def test_runs_that_give_thrusts(self):
+        out, said = self.exported("thrusts.db", CASE)
+        for part in ("raw", "thrusts", "calibration"):
+            self.assertIn(f"without {part}: the runs give thrusts, not voltages", said)
+        self.assertEqual(out["raw"], {})
+        self.assertEqual(len(out["tables"]["recordings"]["run"][1]), 0)
+        given = np.array([[float(row[f"thrust_{k}_N"]) for k in range(1, 5)] for row in Store(CAMPAIGNS / "thrusts.db").sheet("runs")])
+        self.same(np.transpose([out["tables"]["run_coefficients"][f"thrust_{k}_N"][1] for k in range(1, 5)]), given)
+        self.check_dictionary(out)
+
     def test_types_names_and_gaps_of_any_kind(self):
         out, said = self.exported("odd.db", CASE)
         self.assertIn("without maps: ", said)
