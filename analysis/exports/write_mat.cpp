@@ -19,6 +19,7 @@ namespace tunnelrig::exports {
 namespace {
 
 constexpr std::size_t kMatHeader = 128;                // bytes before the first variable
+constexpr std::size_t kCopied = 1 << 18;               // bytes at a time from memory to the file
 constexpr std::uint64_t kLargestVariable = 1u << 31u;  // of level 5
 
 struct FreeVariable {
@@ -32,10 +33,10 @@ T* not_null(T* made) {
   return made;
 }
 
-/// A matrix in the order of columns, copied.
+/// A matrix in the order of columns; `how` is 0 (copied) or MAT_F_DONT_COPY_DATA.
 Variable matrix(const char* name, matio_classes kind, matio_types type, std::array<std::size_t, 2> shape,
-                const void* data) {
-  return Variable(not_null(Mat_VarCreate(name, kind, type, 2, shape.data(), const_cast<void*>(data), 0)));
+                const void* data, int how = 0) {
+  return Variable(not_null(Mat_VarCreate(name, kind, type, 2, shape.data(), const_cast<void*>(data), how)));
 }
 
 Variable numbers(const char* name, const double* values, std::size_t rows, std::size_t columns = 1) {
@@ -106,7 +107,8 @@ Variable value_of(const Collected& collected, std::uint64_t frames) {
                                                                             {MAT_C_SINGLE, MAT_T_SINGLE},
                                                                             {MAT_C_DOUBLE, MAT_T_DOUBLE}}};
   const auto [kind, type] = kTypes[static_cast<std::size_t>(collected.series.element)];
-  return matrix(nullptr, kind, type, {frames, collected.series.columns}, collected.bytes.data());
+  return matrix(nullptr, kind, type, {frames, collected.series.columns}, collected.bytes.data(),
+                MAT_F_DONT_COPY_DATA);
 }
 
 /// matio does not look whether its writes succeed. So each variable is written to memory as a file of its
@@ -136,22 +138,19 @@ class MatFile {
 
  private:
   void append(std::size_t size) {
-    void* map = ::mmap(nullptr, size, PROT_READ, MAP_SHARED | MAP_POPULATE, memory_, 0);
-    if (map == MAP_FAILED) fail_to_write(memory_name_);
-    const std::span<const std::byte> bytes(static_cast<const std::byte*>(map), size);
-    try {
-      out_.write(empty_ ? bytes : bytes.subspan(kMatHeader));
-    } catch (...) {
-      ::munmap(map, size);
-      throw;
+    for (std::size_t at = empty_ ? 0 : kMatHeader; at < size;) {
+      const ssize_t got = ::pread(memory_, buffer_.data(), buffer_.size(), static_cast<off_t>(at));
+      if (got <= 0) fail_to_write(memory_name_);
+      out_.write(std::span(buffer_).first(static_cast<std::size_t>(got)));
+      at += static_cast<std::size_t>(got);
     }
-    ::munmap(map, size);
     empty_ = false;
   }
 
   OutputFile out_;
   int memory_;
   std::string memory_name_;
+  std::vector<std::byte> buffer_ = std::vector<std::byte>(kCopied);
   bool empty_ = true;
 };
 
@@ -162,12 +161,12 @@ class MatWriter : public Writer {
   void begin(const Recording& recording) override {
     recording_ = recording;
     done_ = 0;
-    collected_.clear();
+    collected_.resize(recording.series.size());  // buffers are used again
     std::uint64_t bytes = 0;
-    for (Series series : recording.series) {
+    for (std::size_t s = 0; s < collected_.size(); ++s) {
+      Series& series = collected_[s].series = recording.series[s];
       if (series.name == "frame") series.element = Element::kFloat64;  // as with integers of tables
       bytes += recording.frames * series.frame_size();
-      collected_.push_back({series, {}});
     }
     if (bytes > kLargestVariable - (1u << 20u)) {
       throw InputError(
