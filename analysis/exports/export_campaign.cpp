@@ -120,7 +120,6 @@ struct Plan {
 Plan plan_of(const CampaignFile& file, const Settings& settings) {
   const CampaignData data = read_campaign_data(file);
   const std::vector<RawRun> raw = raw_runs(file);
-  const auto keys = recording_keys(raw);
   Plan plan;
   Contents& contents = plan.contents;
   contents.provenance = {{"format", "tunnelrig-export/1"},
@@ -130,11 +129,15 @@ Plan plan_of(const CampaignFile& file, const Settings& settings) {
                          {"campaign", data.info.name},
                          {"calibration", data.certificate ? fmt::format("{}", data.certificate_id) : ""},
                          {"calibration_points_hash", data.certificate ? data.certificate->points_hash : ""}};
+  plan.sources = recording_sources(file, data, settings.parts, recording_keys(raw), contents.absent);
+  std::map<std::string, std::string> keys;  // of what is exported
+  for (const RecordingSource& source : plan.sources) {
+    contents.recordings.push_back(source.description);
+    keys.emplace(source.raw.run, source.description.key);
+  }
   contents.tables = {campaign_table(data.info), runs_table(data.runs, keys),
                      recordings_table(file, raw, keys, data.info.daq), lost_frames_table(file, raw, keys),
                      channel_statistics_table(data)};
-  plan.sources = recording_sources(file, data, settings.parts, keys, contents.absent);
-  for (const RecordingSource& source : plan.sources) contents.recordings.push_back(source.description);
   say_what_calibration_gives(data, settings.parts, contents);
   add_results(file, data, settings, contents);
   if (settings.parts.models) add_models(file, data, contents);

@@ -217,6 +217,21 @@ class ReadBack(Case):
         self.check_dictionary(out)
         self.assertEqual(export(CAMPAIGNS / "uncalibrated.db", CASE, self.here / "b", "--parts", "maps").returncode, 1, "asked for by name")
 
+    def test_a_run_that_is_being_recorded_and_one_without_frames(self):
+        db = self.here / "busy.db"
+        db.write_bytes((CAMPAIGNS / "rig.db").read_bytes())
+        with sqlite3.connect(db) as file:
+            file.execute("UPDATE raw_runs SET state = 'recording', hash = '' WHERE run = 'R0003'")
+            file.execute("UPDATE raw_runs SET state = 'partial', frames = 0 WHERE run = 'R0005'")
+            file.execute("DELETE FROM raw_chunks WHERE id >> 32 = (SELECT id FROM raw_runs WHERE run = 'R0005')")
+        out, said = self.exported(db, CASE)
+        self.assertIn("without the frames of run R0003: it is being recorded", said)
+        self.assertNotIn("R0003", out["raw"])
+        self.assertEqual(len(out["raw"]["R0005"]["series"]["frame"][1]), 0)
+        table = out["tables"]["recordings"]
+        keys = dict(zip(table["run"][1], table["key"][1]))
+        self.assertEqual((keys["R0002"], keys["R0003"]), ("R0002", ""))
+
     def test_runs_that_give_thrusts(self):
         out, said = self.exported("thrusts.db", CASE)
         for part in ("raw", "thrusts", "calibration"):

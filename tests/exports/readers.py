@@ -126,6 +126,8 @@ def csvs(path):
     runs = table(path / "runs.csv")
     location = dict(zip(runs["run"], runs["location"]))
     for run, key, rate in zip(recordings["run"], recordings["key"], recordings["sample_rate_hz"]):
+        if not key:
+            continue
         file = path / "raw" / f"{key}.csv"
         names = file.open().readline().strip().split(",")
         columns = np.loadtxt(file, delimiter=",", skiprows=1, ndmin=2)
