@@ -181,12 +181,11 @@ Exported export_campaign(const CampaignFile& file, const std::filesystem::path& 
   const Plan plan = plan_of(file, settings);
   const std::unique_ptr<Writer> writer = make_writer(settings.format, staged.path());
   Exported exported{.absent = plan.contents.absent};
+  stream_recordings(file, plan.sources, *writer, progress);
+  exported.recordings = plan.sources.size();
   for (const RecordingSource& source : plan.sources) {
-    stream_recording(file, source, *writer);
     exported.frames += source.raw.frames;
     exported.sample_bytes += source.raw.frames * source.raw.format.frame_size();
-    ++exported.recordings;
-    if (progress) progress(exported.recordings, plan.sources.size());
   }
   for (const Table& table : plan.contents.tables) writer->table(table);
   for (const ArrayGroup& group : plan.contents.groups) writer->group(group);

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 namespace tunnelrig::exports {
 namespace {
@@ -81,20 +82,28 @@ void to_thrust(std::span<const std::byte> samples, std::size_t channels, const T
   }
 }
 
-/// Collects frames until there are enough for a block, and passes the block on.
+/// Collects frames until there are enough for a block, and passes the block on. Buffers serve one recording
+/// after the other: new ones would be new pages each time.
 class BlockSink : public FrameSink {
  public:
-  BlockSink(const RecordingSource& source, Writer& writer) : source_(source), writer_(writer) {
+  explicit BlockSink(Writer& writer) : writer_(writer) {}
+
+  void start(const RecordingSource& source) {
+    source_ = &source;
+    next_ = 0;
     samples_.reserve(kBlockFrames * source.raw.format.frame_size());
+    numbers_.reserve(kBlockFrames);
   }
 
   void frames(std::span<const std::byte> data) override {
-    const std::size_t frame_size = source_.raw.format.frame_size();
+    const std::size_t frame_size = source_->raw.format.frame_size();
     while (!data.empty()) {
       const std::size_t wanted = std::min(data.size() / frame_size, kBlockFrames - held_);
       samples_.insert(samples_.end(), data.begin(),
                       data.begin() + static_cast<std::ptrdiff_t>(wanted * frame_size));
-      for (std::size_t i = 0; i < wanted; ++i) numbers_.push_back(next_++);
+      numbers_.resize(held_ + wanted);
+      std::iota(numbers_.end() - static_cast<std::ptrdiff_t>(wanted), numbers_.end(), next_);
+      next_ += wanted;
       held_ += wanted;
       data = data.subspan(wanted * frame_size);
       if (held_ == kBlockFrames) flush();
@@ -106,7 +115,7 @@ class BlockSink : public FrameSink {
   void flush() {
     if (held_ == 0) return;
     Block block{.frames = held_, .series = {}};
-    for (const Series& series : source_.description.series) block.series.push_back(bytes_of(series));
+    for (const Series& series : source_->description.series) block.series.push_back(bytes_of(series));
     writer_.block(block);
     samples_.clear();
     numbers_.clear();
@@ -117,7 +126,7 @@ class BlockSink : public FrameSink {
   std::span<const std::byte> bytes_of(const Series& series) {
     if (series.name == "frame") {
       if (series.element == Element::kUInt64) return std::as_bytes(std::span(numbers_));
-      narrow_.assign(held_, 0);
+      narrow_.resize(held_);
       std::transform(numbers_.begin(), numbers_.end(), narrow_.begin(),
                      [](std::uint64_t number) { return static_cast<std::uint32_t>(number); });
       return std::as_bytes(std::span(narrow_));
@@ -127,26 +136,26 @@ class BlockSink : public FrameSink {
   }
 
   std::span<const std::byte> thrusts() {
-    const auto channels = static_cast<std::size_t>(source_.raw.format.channels);
-    switch (source_.raw.format.type) {
+    const auto channels = static_cast<std::size_t>(source_->raw.format.channels);
+    switch (source_->raw.format.type) {
       case SampleType::kInt16:
-        to_thrust<std::int16_t>(samples_, channels, *source_.thrust, thrusts_);
+        to_thrust<std::int16_t>(samples_, channels, *source_->thrust, thrusts_);
         break;
       case SampleType::kUInt16:
-        to_thrust<std::uint16_t>(samples_, channels, *source_.thrust, thrusts_);
+        to_thrust<std::uint16_t>(samples_, channels, *source_->thrust, thrusts_);
         break;
       case SampleType::kFloat32:
-        to_thrust<float>(samples_, channels, *source_.thrust, thrusts_);
+        to_thrust<float>(samples_, channels, *source_->thrust, thrusts_);
         break;
       case SampleType::kFloat64:
-        to_thrust<double>(samples_, channels, *source_.thrust, thrusts_);
+        to_thrust<double>(samples_, channels, *source_->thrust, thrusts_);
         break;
     }
     return std::as_bytes(std::span(thrusts_));
   }
 
-  const RecordingSource& source_;
   Writer& writer_;
+  const RecordingSource* source_ = nullptr;
   std::uint64_t next_ = 0;  // number of the next frame
   std::size_t held_ = 0;
   std::vector<std::byte> samples_;
@@ -191,12 +200,18 @@ std::vector<RecordingSource> recording_sources(const CampaignFile& file, const C
   return sources;
 }
 
-void stream_recording(const CampaignFile& file, const RecordingSource& source, Writer& writer) {
-  writer.begin(source.description);
-  BlockSink sink(source, writer);
-  read_raw(file, source.raw, sink);
-  sink.flush();
-  writer.end();
+void stream_recordings(const CampaignFile& file, const std::vector<RecordingSource>& sources, Writer& writer,
+                       const Progress& progress) {
+  BlockSink sink(writer);
+  std::size_t done = 0;
+  for (const RecordingSource& source : sources) {
+    writer.begin(source.description);
+    sink.start(source);
+    read_raw(file, source.raw, sink);
+    sink.flush();
+    writer.end();
+    if (progress) progress(++done, sources.size());
+  }
 }
 
 }  // namespace tunnelrig::exports

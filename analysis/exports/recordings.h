@@ -31,7 +31,8 @@ std::vector<RecordingSource> recording_sources(const CampaignFile& file, const C
                                                const std::map<std::string, std::string>& keys,
                                                std::vector<Absent>& absent);
 
-/// Reads a recording once and hands it to the writer block by block; only a MATLAB file needs it whole.
-void stream_recording(const CampaignFile& file, const RecordingSource& source, Writer& writer);
+/// Reads each recording once and hands it to the writer block by block; only a MATLAB file needs it whole.
+void stream_recordings(const CampaignFile& file, const std::vector<RecordingSource>& sources, Writer& writer,
+                       const Progress& progress);
 
 }  // namespace tunnelrig::exports

@@ -15,6 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kLines = 1 << 16;   // bytes that are passed on at a time
 constexpr std::size_t kLongestCell = 32;  // of a number, with its comma
 
 std::string text_of(double value) { return std::isnan(value) ? std::string() : fmt::format("{}", value); }
@@ -22,32 +23,34 @@ std::string text_of(std::int64_t value) { return fmt::format("{}", value); }
 std::string text_of(std::uint8_t value) { return value != 0 ? "1" : "0"; }
 std::string text_of(const std::string& value) { return value; }
 
-/// Appends one sample and the character behind it.
+/// Appends the samples of one frame, a comma behind each.
 template <typename Number>
-char* append_sample(const std::byte* from, char* to, char behind) {
-  Number value;
-  std::memcpy(&value, from, sizeof(value));
-  to = std::to_chars(to, to + kLongestCell, value).ptr;
-  *to++ = behind;
+char* append_samples(const std::byte* from, std::size_t columns, char* to) {
+  for (std::size_t c = 0; c < columns; ++c) {
+    Number value;
+    std::memcpy(&value, from + c * sizeof(value), sizeof(value));
+    to = std::to_chars(to, to + kLongestCell, value).ptr;
+    *to++ = ',';
+  }
   return to;
 }
 
-using Append = char* (*)(const std::byte*, char*, char);
+using Append = char* (*)(const std::byte*, std::size_t, char*);
 
 Append append_of(Element element) {
   switch (element) {
     case Element::kInt16:
-      return append_sample<std::int16_t>;
+      return append_samples<std::int16_t>;
     case Element::kUInt16:
-      return append_sample<std::uint16_t>;
+      return append_samples<std::uint16_t>;
     case Element::kUInt32:
-      return append_sample<std::uint32_t>;
+      return append_samples<std::uint32_t>;
     case Element::kUInt64:
-      return append_sample<std::uint64_t>;
+      return append_samples<std::uint64_t>;
     case Element::kFloat32:
-      return append_sample<float>;
+      return append_samples<float>;
     case Element::kFloat64:
-      return append_sample<double>;
+      return append_samples<double>;
   }
   return nullptr;
 }
@@ -61,7 +64,9 @@ class CsvWriter : public Writer {
     file_.emplace(folder_ / "raw" / (recording.key + ".csv"));
     std::string header;
     columns_ = 0;
+    appends_.clear();
     for (const Series& series : series_) {
+      appends_.push_back(append_of(series.element));
       for (std::size_t c = 0; c < series.columns; ++c)
         header += (columns_++ > 0 ? "," : "") + series.column_name(c);
     }
@@ -69,18 +74,17 @@ class CsvWriter : public Writer {
   }
 
   void block(const Block& block) override {
-    line_.resize(columns_ * kLongestCell);
+    lines_.resize(kLines + columns_ * kLongestCell);
+    char* at = lines_.data();
     for (std::size_t frame = 0; frame < block.frames; ++frame) {
-      char* at = line_.data();
       for (std::size_t s = 0; s < series_.size(); ++s) {
-        const Append append = append_of(series_[s].element);
-        const std::size_t size = size_of(series_[s].element);
-        const std::byte* from = block.series[s].data() + frame * series_[s].frame_size();
-        for (std::size_t c = 0; c < series_[s].columns; ++c) at = append(from + c * size, at, ',');
+        const std::size_t columns = series_[s].columns;
+        at = appends_[s](block.series[s].data() + frame * series_[s].frame_size(), columns, at);
       }
       at[-1] = '\n';
-      file_->write(std::string_view(line_.data(), static_cast<std::size_t>(at - line_.data())));
+      if (at - lines_.data() > static_cast<std::ptrdiff_t>(kLines)) at = pass_on(at);
     }
+    pass_on(at);
   }
 
   void end() override {
@@ -128,11 +132,18 @@ class CsvWriter : public Writer {
   }
 
  private:
+  /// Writes the lines that end at `end`; gives where the next one begins.
+  char* pass_on(const char* end) {
+    file_->write(std::string_view(lines_.data(), static_cast<std::size_t>(end - lines_.data())));
+    return lines_.data();
+  }
+
   fs::path folder_;
   std::optional<OutputFile> file_;
   std::vector<Series> series_;
   std::size_t columns_ = 0;
-  std::string line_;
+  std::vector<Append> appends_;  // of each series
+  std::vector<char> lines_;
 };
 
 }  // namespace

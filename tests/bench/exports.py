@@ -1,4 +1,5 @@
-"""Exports of the thesis's whole campaign, each beside `cat` of the bytes that it wrote."""
+"""Exports of the thesis's whole campaign, each beside `cat` of the bytes that it wrote: wall and processor seconds, since other work
+on the machine stretches the former."""
 
 import pathlib
 import shutil
@@ -46,7 +47,7 @@ subprocess.run([program, "calibrate", "--db", db], check=True, stdout=subprocess
 raw_MB = float(subprocess.run([program, "export", "--db", db, "--format", "npy", "--parts", "raw", scratch / "first"], check=True, capture_output=True, text=True).stdout.split()[-5])
 remove(scratch / "first")
 print(f"{raw_MB:.0f} MB of raw counts; goal: 200 MB of them a second, or the disk's own speed\n")
-print(f"{'':<26} {'wall':>9} {'raw':>10} {'written':>11} {'written':>10} {'peak':>9} {'of cat':>8}")
+print(f"{'':<26} {'wall':>9} {'raw':>10} {'written':>11} {'written':>10} {'peak':>9} {'of cat':>8} {'processor':>10} {'of cat':>8}")
 for form in ("npy", "hdf5", "mat", "csv", "folder"):
     for parts in ("raw", "all") if form != "folder" else ("all",):
         target = scratch / f"export.{form}"
@@ -57,6 +58,7 @@ for form in ("npy", "hdf5", "mat", "csv", "folder"):
         name = f"{form}, {'raw only' if parts == 'raw' else 'everything'}"
         wall_s = figures["wall_s"]
         print(f"{name:<26} {wall_s:7.2f} s {raw_MB / wall_s:5.0f} MB/s {written_MB:8.0f} MB {written_MB / wall_s:5.0f} MB/s "
-              f"{figures['peak_MB']:6.0f} MB {wall_s / yardstick['wall_s']:8.2f}")
+              f"{figures['peak_MB']:6.0f} MB {wall_s / yardstick['wall_s']:8.2f} "
+              f"{figures['cpu_s']:8.2f} s {figures['cpu_s'] / yardstick['cpu_s']:8.2f}", flush=True)
         remove(target)
 remove(scratch / "copy")
