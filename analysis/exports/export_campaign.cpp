@@ -10,7 +10,11 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <memory>
 #include <utility>
+
+#include <fmt/format.h>
 
 namespace tunnelrig::exports {
 namespace {

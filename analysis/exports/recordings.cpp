@@ -3,10 +3,13 @@
 #include "analysis/exports/tables.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 #include <limits>
 #include <numeric>
+
+#include <fmt/format.h>
 
 namespace tunnelrig::exports {
 namespace {

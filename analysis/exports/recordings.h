@@ -6,7 +6,9 @@
 #include "analysis/exports/writer.h"
 #include "datasets/raw_store.h"
 
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace tunnelrig::exports {

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <cstring>
 #include <optional>
+#include <string>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace tunnelrig::exports {

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <string>
 #include <utility>
 
+#include <fmt/format.h>
 #include <hdf5.h>
 
 namespace tunnelrig::exports {

@@ -8,8 +8,12 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <memory>
+#include <new>
+#include <string>
 #include <utility>
 
+#include <fmt/format.h>
 #include <matio.h>
 #include <sys/mman.h>
 #include <sys/stat.h>

@@ -8,7 +8,9 @@
 #include <array>
 #include <cstring>
 #include <deque>
+#include <string>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace tunnelrig::exports {
