@@ -121,8 +121,10 @@ Figure errors_figure(const Json& flight, const std::string& name, double width_m
     if (rows.empty()) return;
     script += data_block(block, rows);
     plot += fmt::format(
-        "{} ${} using 1:2:3:4 with xerrorbars linecolor rgb '{}' linewidth 0.8 pointtype {} pointsize 0.45",
-        plot.empty() ? "plot" : ",", block, entry.colour, entry.point);
+        "{0} ${1} using 3:2:($4-$3):(0) {2} linecolor rgb '{3}' linewidth 0.8, ${1} using 1:2 with points "
+        "linecolor "
+        "rgb '{3}' linewidth 0.8 pointtype {4} pointsize 0.4",
+        plot.empty() ? "plot" : ",", block, kBars, entry.colour, entry.point);
     entries.push_back(entry);
   };
   add("clean", clean, {"no contact", category_colour(0), 7});

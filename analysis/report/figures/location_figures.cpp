@@ -21,9 +21,10 @@ std::string side_by_side(const Summary& summary, LocationValue LocationSummary::
          fmt::format("set xrange [-0.5:{:.1f}]\nset xtics rotate by 90 right noenhanced ({})\n",
                      static_cast<double>(rows.size()) - 0.5, tics) +
          fmt::format(
-             "plot $points using 1:2:3 with yerrorbars linecolor rgb '{}' linewidth 0.7 pointtype 7 "
-             "pointsize 0.35\n",
-             category_colour(0));
+             "plot $points using 1:($2-$3):(0):(2*$3) {0} linecolor rgb '{1}' linewidth 0.7, $points using "
+             "1:2 "
+             "with points linecolor rgb '{1}' pointtype 7 pointsize 0.35\n",
+             kBars, category_colour(0));
 }
 
 LegendEntry look_of(const std::vector<TunnelColumn>& columns, std::size_t c) {

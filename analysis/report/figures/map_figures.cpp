@@ -69,23 +69,24 @@ void add_layer(const Material& material, const FittedField& field, const FitSumm
   for (const LocationEstimate& location : maps.input.locations)
     picture.locations.push_back({location.y_norm, location.z_norm});
   const std::string shared = fmt::format(
-      " over the tunnel's cross-section, in per cent, against ȳ = 2y/(w_t − w_q) and z̄ = 2z/(h_t − h_q). "
-      "Crosses: the {} measured locations; dashed lines, if any: mirror image of the measured half. ",
+      " across the tunnel, in per cent, against ȳ = 2y/(w_t − w_q) and z̄ = 2z/(h_t − h_q). "
+      "Crosses: the {} measured locations; dashed lines, if any: mirror image of the measured half.",
       picture.locations.size());
   figures.drawn.push_back(drawn_map(
       picture, texts.name,
       texts.caption + shared +
-          fmt::format("Each location predicted from all others is off by {:.2f} percentage points (rms). Its "
-                      "uncertainty is the figure {}_u95.",
-                      fit.leave_one_out.rms_percent, texts.name),
+          fmt::format(
+              " Each location predicted from all others is off by {:.2f} percentage points (rms). Its "
+              "uncertainty is the figure {}_u95.",
+              fit.leave_one_out.rms_percent, texts.name),
       width_mm));
   picture.colour_label = fmt::format("U_{{95}}({}) [%]", texts.symbol);
   picture.diverging = false;
   picture.values = layer.u95_percent;
   picture.lines = contour_plot(grid, picture.values, kPrintedUncertaintyLevels);
-  figures.drawn.push_back(
-      drawn_map(picture, fmt::format("{}_u95", texts.name),
-                fmt::format("U95 of {} ({:g} standard uncertainties)", texts.name, k) + shared, width_mm));
+  figures.drawn.push_back(drawn_map(
+      picture, fmt::format("{}_u95", texts.name),
+      fmt::format("U95 of the figure {} ({:g} standard uncertainties)", texts.name, k) + shared, width_mm));
 }
 
 }  // namespace
@@ -99,7 +100,7 @@ Figures map_figures(const Material& material, double width_mm) {
       {"delta_ct", "ΔC_T", "Change of the thrust coefficient against that in the middle of the tunnel (OT)"},
       width_mm, figures);
   add_layer(material, material.fitted->uneven_thrust, material.map->uneven_thrust_fit,
-            {"uneven_thrust", "U", "Uneven thrust, right pair of rotors minus left pair over all four"},
+            {"uneven_thrust", "U", "Uneven thrust U (right pair of rotors minus left pair, over all four)"},
             width_mm, figures);
   return figures;
 }

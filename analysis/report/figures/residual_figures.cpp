@@ -74,12 +74,14 @@ std::string error_panel(const Json& explanation) {
          fmt::format(
              "set xrange [0:*]\nset yrange [-0.6:2.6]\nset ytics ('before' 2, 'after' 1, 'noise floor' 0)\n"
 
-             "plot $before using 1:2:3:4 with xerrorbars linecolor rgb '{}' linewidth 0.9 pointtype 5 "
-             "pointsize 0.5, "
-             "$after using 1:2:3:4 with xerrorbars linecolor rgb '{}' linewidth 0.9 pointtype 7 pointsize "
-             "0.5, "
+             "plot $before using 3:2:($4-$3):(0) {0} linecolor rgb '{1}' linewidth 0.9, $before using 1:2 "
+             "with points "
+             "linecolor rgb '{1}' pointtype 5 pointsize 0.5, "
+             "$after using 3:2:($4-$3):(0) {0} linecolor rgb '{2}' linewidth 0.9, $after using 1:2 with "
+             "points "
+             "linecolor rgb '{2}' pointtype 7 pointsize 0.5, "
              "$floor using 1:2 with points linecolor rgb '#000000' pointtype 13 pointsize 0.6\n",
-             category_colour(1), category_colour(0));
+             kBars, category_colour(1), category_colour(0));
 }
 
 }  // namespace

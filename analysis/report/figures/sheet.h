@@ -50,6 +50,9 @@ struct LegendEntry {
 /// Points that look alike in size: triangles and diamonds are smaller than their type says.
 double point_size(int point);
 
+/// How bars are drawn, from x, y, Δx and Δy: gnuplot's own errorbars blank a disc around a small point.
+constexpr const char* kBars = "with vectors heads size screen 0.006,90";
+
 constexpr double kLegendRow_mm = 3.3;
 
 /// A legend in so many columns over the whole width, row by row; the first one's middle is at that height. At

@@ -52,9 +52,9 @@ std::vector<double> with_bar(double x, const LocationValue& value) {
 std::string bar_curve(const std::string& block, const LegendEntry& look) {
   const std::string line = fmt::format("linecolor rgb '{}' linewidth {}", look.colour, look.line_width);
   return fmt::format(
-      "${0} using 1:2 with lines {1} dashtype {2}, "
-      "${0} using 1:2:3 with yerrorbars {1} pointtype {3} pointsize {4}",
-      block, line, look.dash, look.point, point_size(look.point));
+      "${0} using 1:2 with lines {1} dashtype {2}, ${0} using 1:($2-$3):(0):(2*$3) {3} {1}, "
+      "${0} using 1:2 with points {1} pointtype {4} pointsize {5}",
+      block, line, look.dash, kBars, look.point, point_size(look.point));
 }
 
 }  // namespace tunnelrig::report

@@ -65,7 +65,7 @@ function bestController({flown}) {
         contactsOf(contacts)}; it is first, or not told apart from the first, in ${flown.first_in} of them.`;
   }
   const {ci95_mm: interval, as_good: others} = flown;
-  const bar = interval ? ` (95 % interval of a run’s: ${fixed(interval[0], 1)} to ${fixed(interval[1], 1)})` : '';
+  const bar = interval ? ` (mean over the runs, 95 %: ${fixed(interval[0], 1)} to ${fixed(interval[1], 1)} mm)` : '';
   const ties = others.length ? `; the runs do not tell it from ${others.join(', ')}` : '';
   return `${among} ${flown.scenario} in the ${flown.tunnel} tunnel, ${name} does best: ${
       fixed(rms, 1)} mm rms error${bar}, ${contactsOf(contacts)}${ties}.`;
