@@ -9,6 +9,8 @@
 #include <array>
 #include <cmath>
 
+#include <fmt/format.h>
+
 namespace tunnelrig {
 namespace {
 

@@ -68,8 +68,9 @@ Figures calibration_figures(const Material& material, double width_mm) {
                         -axes.reach_mN, axes.reach_mN);
   for (std::size_t i = 0; i < cells; ++i) {
     const bool leftmost = i % across == 0, lowest = i + across >= cells;
+    const std::size_t row = i / across;
     const double left = kLeft_mm + static_cast<double>(i % across) * (column_mm + kGap_mm);
-    const double top = sheet.height_mm - kTop_mm - static_cast<double>(i / across) * (kRow_mm + kGap_mm);
+    const double top = sheet.height_mm - kTop_mm - static_cast<double>(row) * (kRow_mm + kGap_mm);
     script +=
         kNextPanel + sheet.axes({left, left + column_mm, top - kRow_mm, top},
                                 lowest ? "applied force [N]" : "", leftmost ? "residual [mN]" : "", 10.5);
