@@ -50,14 +50,6 @@ std::vector<std::vector<double>> block(const std::string& script, const std::str
   return rows;
 }
 
-ModelVersion model() {
-  ModelVersion version{.version = 1, .explanation = test::explanation("explained").dump()};
-  version.curves = {
-      {.covariate = "air_temperature_C", .low = 10, .high = 30, .coefficients = {0.02}, .centre = {0.5}}};
-  version.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-6);
-  return version;
-}
-
 /// A controller whose name would end a quoted text, run a command, and end a block of data.
 constexpr const char* kHostileFlights =
     R"({"format": "tunnelrig-flights/1", "command": "tunnelrig fly",
@@ -156,7 +148,7 @@ TEST_F(DrawnFiguresTest, ModelsAndFlightsHaveFiguresWhereThereAreSome) {
   test::make_campaign(db, {.odd_label = "it's `touch owned`"});
   write_text(folder / "flights.json", kHostileFlights);
   ReportSettings report = settings();
-  report.model.version = model();
+  report.model.version = test::adopted_model();
   report.flights = (folder / "flights.json").string();
   const WrittenFigures written = write(report, {.command = "tunnelrig report --figures fig"});
   std::set<std::string> expected = kCampaignFigures;
@@ -249,7 +241,7 @@ TEST_F(FiguresTest, AModelsErrorsAreItsExplanations) {
   test::make_campaign(db, {.raw_data = false});
   const CampaignFile file(db, CampaignFile::Access::kRead);
   ReportSettings report = settings();
-  report.model.version = model();
+  report.model.version = test::adopted_model();
   const report::Material material = report::gather(file, report);
   const std::string script = report::residual_figures(material, 84).drawn[0].script;
   EXPECT_EQ(block(script, "before")[0], (std::vector<double>{0.062, 2, 0.05, 0.08}));

@@ -275,10 +275,7 @@ TEST_F(ReportTest, TheSummarySaysWhatIsMissingOfAPartialCampaign) {
 
 TEST_F(ReportTest, TheSummaryHasTheModelInForce) {
   make_campaign(db, {.raw_data = false});
-  ModelVersion version{.version = 3, .explanation = test::explanation("explained").dump()};
-  version.curves = {
-      {.covariate = "air_temperature_C", .low = 10, .high = 30, .coefficients = {0.02}, .centre = {0.5}}};
-  version.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-6);
+  const ModelVersion version = test::adopted_model();
   const CampaignFile file(db, CampaignFile::Access::kRead);
   const Json page = Json::parse(report_data(file, {.db = "c.db", .model = {{}, version}}).json);
   const Json& model = page["summary"]["model"];
