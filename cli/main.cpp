@@ -1,7 +1,7 @@
 // tunnelrig: the program's verbs.
 
 #include "cli/console.h"
-#include "cli/verb.h"
+#include "cli/verbs.h"
 #include "datasets/error.h"
 
 #include <cstdio>
@@ -19,19 +19,9 @@ int report(const std::string& text, int code) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app(
-      "tunnelrig: from the packets of a static-thrust rig to maps of the disturbance a quadcopter meets in a "
-      "tunnel.\n"
-      "\n"
-      "Exit codes: 0 all is well, 1 a problem was found, 2 bad input.");
-  app.set_version_flag("--version", program_version());
-  app.require_subcommand(1);
-  app.get_formatter()->column_width(34);
+  CLI::App app;
   Work work;
-  for (const auto add : {add_log, add_plan, add_import, add_export, add_calibrate, add_reduce, add_map,
-                         add_report, add_devices, add_doctor, add_explain, add_models, add_fly}) {
-    add(app, work);
-  }
+  declare_program(app, work);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -24,6 +24,7 @@ void add_fly(CLI::App& app, Work& run);
 void add_models(CLI::App& app, Work& run);
 void add_doctor(CLI::App& app, Work& run);
 void add_devices(CLI::App& app, Work& run);
+void add_demo(CLI::App& app, Work& run);
 
 /// --model and --with, as every verb that reduces has them.
 void add_model_options(CLI::App& verb, std::string& model, std::string& terms);

@@ -6,13 +6,12 @@
 namespace tunnelrig {
 namespace {
 
-// Half the extent of a label in the picture, in normalised coordinates.
-constexpr double kHalfWidth = 0.1, kHalfHeight = 0.045;
 constexpr double kShortest = 0.35;  // length of a line worth a label
 
 /// Distance of two points in label sizes: below 1 a label at one covers the other.
-double label_distance(const TunnelPoint& a, const TunnelPoint& b) {
-  return std::max(std::abs(a.y_norm - b.y_norm) / kHalfWidth, std::abs(a.z_norm - b.z_norm) / kHalfHeight);
+double label_distance(const TunnelPoint& a, const TunnelPoint& b, const LabelSize& size) {
+  return std::max(std::abs(a.y_norm - b.y_norm) / size.half_width,
+                  std::abs(a.z_norm - b.z_norm) / size.half_height);
 }
 
 double length(const ContourLine& line) {
@@ -24,16 +23,16 @@ double length(const ContourLine& line) {
   return sum;
 }
 
-double nearest(const TunnelPoint& at, const std::vector<TunnelPoint>& points) {
+double nearest(const TunnelPoint& at, const std::vector<TunnelPoint>& points, const LabelSize& size) {
   double least = 1e9;
-  for (const TunnelPoint& point : points) least = std::min(least, label_distance(at, point));
+  for (const TunnelPoint& point : points) least = std::min(least, label_distance(at, point, size));
   return least;
 }
 
 }  // namespace
 
 std::vector<ContourLabel> place_labels(const std::vector<ContourLine>& lines,
-                                       const std::vector<TunnelPoint>& marks) {
+                                       const std::vector<TunnelPoint>& marks, const LabelSize& size) {
   std::vector<ContourLabel> labels;
   std::vector<TunnelPoint> taken;
   for (const ContourLine& line : lines) {
@@ -42,11 +41,12 @@ std::vector<ContourLabel> place_labels(const std::vector<ContourLine>& lines,
     const TunnelPoint* place = nullptr;
     for (const TunnelPoint& at : line.points) {
       const double from_border =
-          std::min((1 - std::abs(at.y_norm)) / kHalfWidth, (1 - std::abs(at.z_norm)) / kHalfHeight);
+          std::min((1 - std::abs(at.y_norm)) / size.half_width, (1 - std::abs(at.z_norm)) / size.half_height);
       // Two labels want twice the room of one; other lines may be near, but not in the way.
-      double clearance = std::min({from_border, nearest(at, marks), 0.5 * nearest(at, taken), 3.0});
+      double clearance =
+          std::min({from_border, nearest(at, marks, size), 0.5 * nearest(at, taken, size), 3.0});
       for (const ContourLine& other : lines) {
-        if (&other != &line) clearance = std::min(clearance, 1 + nearest(at, other.points));
+        if (&other != &line) clearance = std::min(clearance, 1 + nearest(at, other.points, size));
       }
       if (clearance <= best) continue;
       best = clearance;

@@ -15,16 +15,17 @@
 namespace tunnelrig {
 namespace {
 
-/// Starts the program with its three streams in files of the folder, so that no pipe can block or break.
+/// Starts the program in the folder, without a pipe that could block or break. The script is a file by name:
+/// from standard input gnuplot reads it byte by byte, which takes seconds for a map.
 int spawn(const std::string& program, const std::filesystem::path& folder, pid_t* child) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "script", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "complaint", O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  std::string name = program, no_user_settings = "-d";
-  char* arguments[] = {name.data(), no_user_settings.data(), nullptr};
+  std::string name = program, no_user_settings = "-d", script = "script";
+  char* arguments[] = {name.data(), no_user_settings.data(), script.data(), nullptr};
   const int error = posix_spawnp(child, program.c_str(), &actions, nullptr, arguments, environ);
   posix_spawn_file_actions_destroy(&actions);
   return error;

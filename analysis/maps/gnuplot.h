@@ -7,9 +7,8 @@
 
 namespace tunnelrig {
 
-/// Runs `program` in `folder`, a scratch folder where it leaves files of its own, with the script on its
-/// standard input. Returns nothing where it succeeds, else why it did not: not installed, or what it
-/// complains of.
+/// Runs `program` on the script in `folder`, a scratch folder where it leaves files of its own. Returns
+/// nothing where it succeeds, else why it did not: not installed, or what it complains of.
 std::optional<std::string> run_gnuplot(const std::string& program, const std::filesystem::path& folder,
                                        const std::string& script);
 

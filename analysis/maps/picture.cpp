@@ -1,7 +1,5 @@
 #include "analysis/maps/picture.h"
 
-#include "analysis/maps/contour_labels.h"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -106,66 +104,97 @@ std::string colours(const Picture& picture) {
                      picture.diverging ? -end : 0, end, step);
 }
 
+std::string margins(const PictureFrame& frame) {
+  return fmt::format(
+      "set lmargin at screen {0:.5f}\nset rmargin at screen {1:.5f}\n"
+      "set bmargin at screen {2:.5f}\nset tmargin at screen {3:.5f}\n"
+      "set xrange [-1:1]\nset yrange [-1:1]\n"
+      "set colorbox user origin screen {4:.5f},{2:.5f} size screen {5:.5f},{6:.5f}\n",
+      frame.left, frame.right, frame.bottom, frame.top, frame.bar_left, frame.bar_width,
+      frame.top - frame.bottom);
+}
+
 /// Both pairs of axes: normalised coordinates, and metres from the tunnel's centre (4.1, 4.2).
-std::string axes(const MapGeometry& geometry) {
+std::string axes_in_metres_too(const MapGeometry& geometry) {
   const double y_m = (geometry.tunnel_width_m - geometry.vehicle_width_m) / 2;
   const double z_m = (geometry.tunnel_height_m - geometry.vehicle_height_m) / 2;
   return fmt::format(
-      "set lmargin at screen 0.135\nset rmargin at screen 0.73\n"
-      "set bmargin at screen 0.125\nset tmargin at screen 0.807\n"
-      "set xrange [-1:1]\nset yrange [-1:1]\n"
       "set x2range [-{0:.6g}:{0:.6g}]\nset y2range [-{1:.6g}:{1:.6g}]\n"
       "set xtics -1,0.5,1 nomirror out\nset ytics -1,0.5,1 nomirror out\n"
       "set x2tics {2:.6g} out offset 0,-0.3\nset y2tics {3:.6g} out offset -0.3,0\n"
       "set xlabel '← wall              ȳ = 2y / (w_t − w_q)              wall →'\n"
       "set ylabel '← ground             z̄ = 2z / (h_t − h_q)             ceiling →'\n"
-      "set x2label 'y (m)' offset 0,-0.5\nset y2label 'z (m)' offset -1,0\n"
-      "set colorbox user origin screen 0.85,0.125 size screen 0.028,0.682\n",
+      "set x2label 'y (m)' offset 0,-0.5\nset y2label 'z (m)' offset -1,0\n",
       y_m, z_m, nice_step(y_m / 4), nice_step(z_m / 4));
 }
 
-std::string plot(bool dashed) {
+std::string plain_axes() { return "set xtics -1,0.5,1 nomirror out\nset ytics -1,0.5,1 nomirror out\n"; }
+
+std::string plot(bool dashed, double scale) {
   std::string command = "plot $field using 1:2:3 with image notitle";
   if (dashed)
-    command += ", $mirrored with lines linecolor rgb '#303030' linewidth 1.3 dashtype (9,6) notitle";
-  command +=
-      ", $measured with lines linecolor rgb '#101010' linewidth 1.6 notitle"
-      ", $crosses with lines linecolor rgb 'white' linewidth 5 notitle"
-      ", $crosses with lines linecolor rgb '#101010' linewidth 2 notitle"
-      ", $labels using 1:2:3 with labels boxed notitle\n";
-  return command;
+    command += fmt::format(
+        ", $mirrored with lines linecolor rgb '#303030' linewidth {:.3g} dashtype (9,6) notitle",
+        1.3 * scale);
+  return command + fmt::format(
+                       ", $measured with lines linecolor rgb '#101010' linewidth {:.3g} notitle"
+                       ", $crosses with lines linecolor rgb 'white' linewidth {:.3g} notitle"
+                       ", $crosses with lines linecolor rgb '#101010' linewidth {:.3g} notitle"
+                       ", $labels using 1:2:3 with labels boxed notitle\n",
+                       1.6 * scale, 5 * scale, 2 * scale);
 }
 
-}  // namespace
+/// The lines of the halves that were measured, and of those that are their mirror images.
+struct Halves {
+  std::vector<ContourLine> measured, mirrored;
+};
 
-std::string gnuplot_script(const Picture& picture, const std::string& stem) {
+Halves halves_of(const Picture& picture) {
   const auto on_side = [&](double sign) {
     return std::any_of(picture.locations.begin(), picture.locations.end(),
                        [&](const TunnelPoint& point) { return sign * point.y_norm > 0; });
   };
   const std::vector<ContourLine> drawn = picture.diverging ? picture.lines : without_specks(picture.lines);
-  std::vector<ContourLine> measured, mirrored;
+  Halves halves;
   for (const bool right : {false, true}) {
-    std::vector<ContourLine>& half = on_side(right ? 1 : -1) ? measured : mirrored;
+    std::vector<ContourLine>& half = on_side(right ? 1 : -1) ? halves.measured : halves.mirrored;
     for (ContourLine& line : lines_of_half(drawn, right)) half.push_back(std::move(line));
   }
+  return halves;
+}
+
+}  // namespace
+
+DrawnPicture draw_picture(const Picture& picture, const PictureFrame& frame) {
+  const Halves halves = halves_of(picture);
+  const bool dashed = !halves.mirrored.empty();
   const auto block = [](const char* name, const std::string& lines) {
     return fmt::format("${} << END\n{}END\n", name, lines);
   };
-  std::string script =
+  const auto labelled = place_labels(halves.measured, picture.locations, frame.label);
+  std::string setup =
       "reset\nset encoding utf8\nset minussign\nset style textbox opaque noborder margins 0.4,0.4\n";
-  script += block("field", field(picture)) + block("measured", polylines(measured)) +
-            block("mirrored", polylines(mirrored)) + block("crosses", crosses(picture.locations)) +
-            block("labels", labels(place_labels(measured, picture.locations), picture.diverging));
-  script += colours(picture) + axes(picture.geometry);
-  script += fmt::format("set title \"{}\\n{{/*0.8 {}{}}}\"\n", picture.title, picture.note,
-                        mirrored.empty() ? "" : "; dashed: mirrored");
+  setup += block("field", field(picture)) + block("measured", polylines(halves.measured)) +
+           block("mirrored", polylines(halves.mirrored)) + block("crosses", crosses(picture.locations)) +
+           block("labels", labels(labelled, picture.diverging));
+  setup += colours(picture) + margins(frame);
+  setup += frame.titled ? axes_in_metres_too(picture.geometry) : plain_axes();
+  if (frame.titled)
+    setup += fmt::format("set title \"{}\\n{{/*0.8 {}{}}}\"\n", picture.title, picture.note,
+                         dashed ? "; dashed: mirrored" : "");
   // Not as cblabel, which long numbers on the bar push out of the picture.
-  script += fmt::format("set label '{}' at screen 0.975,0.466 center rotate by 90\n", picture.colour_label);
+  setup += fmt::format("set label '{}' at screen {:.5f},{:.5f} center rotate by 90\n", picture.colour_label,
+                       frame.bar_label, (frame.bottom + frame.top) / 2);
+  return {setup, plot(dashed, frame.line_scale)};
+}
+
+std::string gnuplot_script(const Picture& picture, const std::string& stem) {
+  const DrawnPicture drawn = draw_picture(picture);
+  std::string script = drawn.setup;
   for (const auto& [terminal, font_size] : {std::pair{"svg", 20}, std::pair{"pngcairo", 18}}) {  // look alike
     script += fmt::format(
         "set terminal {} size 1100,960 font 'sans-serif,{}'\nset output '{}.{}'\n{}unset output\n", terminal,
-        font_size, stem, std::string(terminal).substr(0, 3), plot(!mirrored.empty()));
+        font_size, stem, std::string(terminal).substr(0, 3), drawn.plot);
   }
   return script;
 }

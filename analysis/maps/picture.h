@@ -1,6 +1,7 @@
 // A field of the tunnel's cross-section as a picture, in the manner of the thesis's figures 5.58 and 5.59.
 #pragma once
 
+#include "analysis/maps/contour_labels.h"
 #include "analysis/maps/contours.h"
 #include "analysis/maps/disturbance_map.h"
 #include "datasets/locations.h"
@@ -22,7 +23,23 @@ struct Picture {
   MapGeometry geometry;
 };
 
-/// A gnuplot script that carries its data and writes `stem`.svg and `stem`.png into the working folder.
+/// Where a picture stands on its canvas, in fractions of it, and how heavy its lines are.
+struct PictureFrame {
+  double left = 0.135, right = 0.73, bottom = 0.125, top = 0.807;  // of the field
+  double bar_left = 0.85, bar_width = 0.028, bar_label = 0.975;    // of the colours beside it
+  double line_scale = 1;                                           // over the lines of `map`
+  bool titled = true;  // with title, note, titles of the axes and axes in metres; else the caller has its own
+  LabelSize label;
+};
+
+/// Commands for gnuplot, which carry their data: what is the same for all terminals, and the plot itself.
+struct DrawnPicture {
+  std::string setup, plot;
+};
+
+DrawnPicture draw_picture(const Picture& picture, const PictureFrame& frame = {});
+
+/// A gnuplot script that writes `stem`.svg and `stem`.png into the working folder.
 std::string gnuplot_script(const Picture& picture, const std::string& stem);
 
 }  // namespace tunnelrig

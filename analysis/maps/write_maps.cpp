@@ -3,14 +3,13 @@
 #include "analysis/maps/contours.h"
 #include "analysis/maps/gnuplot.h"
 #include "analysis/maps/picture.h"
+#include "analysis/maps/staging.h"
 #include "datasets/csv.h"
-#include "datasets/error.h"
 
 #include <array>
-#include <cerrno>
 #include <cmath>
-#include <cstdlib>
-#include <system_error>
+
+#include <fmt/format.h>
 
 namespace tunnelrig {
 namespace {
@@ -23,49 +22,6 @@ constexpr int kMostLevels = 14, kMostUncertaintyLevels = 5;
 constexpr std::array kPictures = {"delta_ct.svg",          "delta_ct.png",         "delta_ct_u95.svg",
                                   "delta_ct_u95.png",      "uneven_thrust.svg",    "uneven_thrust.png",
                                   "uneven_thrust_u95.svg", "uneven_thrust_u95.png"};
-
-/// A scratch folder within the target, so that renaming out of it stays on one file system; gone afterwards.
-class Staging {
- public:
-  explicit Staging(const std::filesystem::path& target) : target_(target) {
-    std::error_code error;
-    std::filesystem::create_directories(target, error);
-    std::string name = (target / ".maps-XXXXXX").string();
-    if (error || ::mkdtemp(name.data()) == nullptr) {
-      throw InputError::in(target.string(), "maps cannot be written here: {}",
-                           error ? error.message() : std::generic_category().message(errno));
-    }
-    path_ = name;
-  }
-  ~Staging() {
-    std::error_code error;
-    std::filesystem::remove_all(path_, error);
-  }
-  Staging(const Staging&) = delete;
-  Staging& operator=(const Staging&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-
-  /// Renames the files into the target, after a look at what alone could stop that half-way.
-  std::vector<std::filesystem::path> publish(const std::vector<std::string>& names) const {
-    std::vector<std::filesystem::path> files;
-    for (const std::string& name : names) {
-      files.push_back(target_ / name);
-      if (std::filesystem::is_directory(files.back())) {
-        throw InputError::in(files.back().string(), "is a folder where a file of the map is to be written");
-      }
-    }
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      std::error_code error;
-      std::filesystem::rename(path_ / names[i], files[i], error);
-      if (error) throw InputError::in(files[i].string(), "cannot be written: {}", error.message());
-    }
-    return files;
-  }
-
- private:
-  std::filesystem::path target_, path_;
-};
 
 /// One of the two fields as it is drawn, under the name of its files.
 struct Drawing {
@@ -145,7 +101,7 @@ WrittenMaps write_maps(const std::filesystem::path& folder, const TunnelMaps& ma
       {"uneven_thrust.csv", layer_csv(map.grid, map.uneven_thrust)},
       {"uneven_thrust_contours.csv", contours_csv(uneven.lines)}};
 
-  const Staging staging(folder);
+  const Staging staging(folder, "maps");
   std::vector<std::string> names;
   for (const auto& [name, text] : texts) {
     write_text(staging.path() / name, text);

@@ -3,6 +3,9 @@
 #include "datasets/error.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
 
 namespace tunnelrig::report {
 namespace {
@@ -48,6 +51,91 @@ std::string wrong_with(const Json& flight) {
 }
 
 }  // namespace
+
+namespace {
+
+double error_mm(const Json& controller) {
+  return std::hypot(controller["rms_y_mm"].get<double>(), controller["rms_z_mm"].get<double>());
+}
+
+/// Fewer contacts are better, then smaller errors.
+std::pair<double, double> flight_rank(const Json& controller) {
+  return {controller["contacts"].get<double>(), error_mm(controller)};
+}
+
+std::optional<std::pair<double, double>> interval_mm(const Json& controller) {
+  const Json interval = controller.value("ci95_rms_mm", Json());
+  if (!are_numbers(interval) || interval.size() != 2) return {};
+  return std::pair(interval[0].get<double>(), interval[1].get<double>());
+}
+
+/// Whether the runs cannot tell a controller from the best one: as many contacts, and intervals that overlap.
+bool as_good(const Json& controller, const Json& best) {
+  const auto one = interval_mm(controller), other = interval_mm(best);
+  return controller["name"] != best["name"] && controller["contacts"] == best["contacts"] && one && other &&
+         one->first <= other->second;
+}
+
+const Json& best_of(const Json& flight) {
+  const Json& all = flight["controllers"];
+  return *std::min_element(all.begin(), all.end(),
+                           [](const Json& a, const Json& b) { return flight_rank(a) < flight_rank(b); });
+}
+
+const Json* controller_in(const Json& flight, const Json& name) {
+  for (const Json& controller : flight["controllers"])
+    if (controller["name"] == name) return &controller;
+  return nullptr;
+}
+
+Json best_of_one(const Json& flight) {
+  const Json& best = best_of(flight);
+  const auto interval = interval_mm(best);
+  Json json{{"scenario", flight["scenario"]}, {"tunnel", flight["tunnel"]}, {"name", best["name"]},
+            {"contacts", best["contacts"]},   {"rms_mm", error_mm(best)},     {"ci95_mm", nullptr},
+            {"as_good", Json::array()}};
+  if (interval) json["ci95_mm"] = {interval->first, interval->second};
+  for (const Json& controller : flight["controllers"])
+    if (as_good(controller, best)) json["as_good"].push_back(controller["name"]);
+  return json;
+}
+
+/// Over all scenarios: the sum of the contacts, then the root mean square of the errors.
+Json best_of_all(const Json& flights) {
+  Json best;
+  std::pair<double, double> best_rank;
+  for (const Json& candidate : flights[0]["controllers"]) {
+    double contacts = 0, squares = 0;
+    int flown = 0, first_in = 0;
+    for (const Json& flight : flights) {
+      const Json* controller = controller_in(flight, candidate["name"]);
+      if (controller == nullptr) break;
+      ++flown;
+      contacts += (*controller)["contacts"].get<double>();
+      squares += error_mm(*controller) * error_mm(*controller);
+      const Json& first = best_of(flight);
+      first_in += first["name"] == candidate["name"] || as_good(*controller, first) ? 1 : 0;
+    }
+    if (flown < static_cast<int>(flights.size())) continue;
+    const std::pair here(contacts, std::sqrt(squares / flown));
+    if (!best.is_null() && !(here < best_rank)) continue;
+    best_rank = here;
+    best = {
+        {"name", candidate["name"]}, {"contacts", contacts}, {"rms_mm", here.second}, {"first_in", first_in}};
+  }
+  return best;
+}
+
+}  // namespace
+
+Json best_controller(const Json& section) {
+  const Json& flights = section["flights"];
+  Json json = flights.size() == 1 ? best_of_one(flights[0]) : best_of_all(flights);
+  if (json.is_null()) return json;
+  json["scenarios"] = flights.size();
+  json["controllers"] = flights[0]["controllers"].size();
+  return json;
+}
 
 Json flights_section(const std::string& path) {
   Json document = Json::parse(read_text(path), nullptr, false);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <set>
 
+#include <fmt/format.h>
+
 namespace tunnelrig::report {
 namespace {
 
@@ -21,28 +23,65 @@ Json value_at(const std::string& location, double value, double u95) {
   return {{"location", location}, {"value", value}, {"u95", maybe(u95)}};
 }
 
-void add_extremes_of_map(const DisturbanceMap& map, Json& json) {
+Json value_in_tunnel(const MeasuredLocation& location, double value, double u95) {
+  Json json = value_at(location.label, value, u95);
+  json["y_norm"] = location.y_norm;
+  json["z_norm"] = location.z_norm;
+  return json;
+}
+
+/// Of the measured locations: in between a map is an estimate, and its extremes are those of its grid.
+void add_extremes_of_map(const Material& material, Json& json) {
+  if (!material.map) {
+    json["missing"].push_back(
+        fmt::format("There is no map, and so no maximum of ΔC_T: {}.", material.not_mapped));
+    return;
+  }
+  const auto& locations = material.map->locations;
   const auto [least, greatest] = std::minmax_element(
-      map.locations.begin(), map.locations.end(),
+      locations.begin(), locations.end(),
       [](const auto& a, const auto& b) { return a.delta_ct_percent < b.delta_ct_percent; });
   json["greatest_delta_ct_percent"] =
-      value_at(greatest->label, greatest->delta_ct_percent, greatest->delta_ct_u95_percent);
+      value_in_tunnel(*greatest, greatest->delta_ct_percent, greatest->delta_ct_u95_percent);
   json["least_delta_ct_percent"] =
-      value_at(least->label, least->delta_ct_percent, least->delta_ct_u95_percent);
+      value_in_tunnel(*least, least->delta_ct_percent, least->delta_ct_u95_percent);
 }
 
 /// Of the tunnel's locations; of all where none is in a tunnel.
-void add_extreme_of_u(const Summary& summary, Json& json) {
+void add_extreme_of_u(const Material& material, Json& json) {
+  if (material.data.info.rig.rotors != kMaxRotors) {
+    json["missing"].push_back("There is no uneven thrust U: it compares two pairs of rotors.");
+    return;
+  }
   const LocationSummary* greatest = nullptr;
   const auto rank = [](const LocationSummary& location) {
     return std::pair(location.y_norm.has_value(), std::abs(location.u_percent.mean));
   };
-  for (const LocationSummary& location : summary.locations) {
+  for (const LocationSummary& location : material.summary->locations) {
     if (greatest == nullptr || rank(*greatest) < rank(location)) greatest = &location;
   }
   if (greatest == nullptr) return;
-  json["greatest_uneven_percent"] =
+  Json& value = json["greatest_uneven_percent"] =
       value_at(greatest->label, greatest->u_percent.mean, greatest->u_percent.u95);
+  if (greatest->y_norm) {
+    value["y_norm"] = *greatest->y_norm;
+    value["z_norm"] = *greatest->z_norm;
+  }
+}
+
+/// The effects that the coefficients are corrected for, and what that gained on blocks held out.
+void add_model(const Material& material, Json& json) {
+  const auto& version = material.settings.model.version;
+  if (!version) {
+    json["missing"].push_back(
+        "No adopted effect is in force, so there is no error before and after (`tunnelrig explain "
+        "--adopt`).");
+    return;
+  }
+  const Json explanation = Json::parse(version->explanation);
+  json["model"] = {{"name", version->name()}, {"effects", version->effects()}};
+  for (const char* key : {"unit", "before", "after", "noise_floor"})
+    json["model"][key] = explanation.value(key, Json());
 }
 
 }  // namespace
@@ -62,15 +101,20 @@ Json summary_section(const Material& material) {
   json["frames_emitted"] = emitted;
   json["frames_lost"] = lost;
   if (data.certificate) json["calibration_passed"] = data.certificate->passed();
-  if (!material.summary) return json;
+  json["missing"] = Json::array();
+  if (!material.summary) {
+    json["missing"].push_back(fmt::format("There are no coefficients: {}.", material.not_reduced));
+    return json;
+  }
   json["reduced_runs"] = material.reduction->runs.size();
   json["locations"] = material.summary->locations.size();
   for (const LocationSummary& location : material.summary->locations) {
     if (location.label == "OS" || location.label == "OT")
       json["c_t"].push_back(value_at(location.label, location.c_t.mean, location.c_t.u95));
   }
-  if (material.map) add_extremes_of_map(*material.map, json);
-  if (data.info.rig.rotors == kMaxRotors) add_extreme_of_u(*material.summary, json);
+  add_extremes_of_map(material, json);
+  add_extreme_of_u(material, json);
+  add_model(material, json);
   return json;
 }
 

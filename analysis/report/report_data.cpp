@@ -1,7 +1,5 @@
 #include "analysis/report/report_data.h"
 
-#include "analysis/maps/tunnel_maps.h"
-#include "analysis/reduction_output.h"
 #include "analysis/report/sections.h"
 #include "datasets/error.h"
 
@@ -13,49 +11,9 @@ namespace {
 using report::Json;
 using report::Material;
 
-// Finer than the grid of `map`, so that the page's lines are smooth; with a column at ȳ = 0, where it changes
-// from the measured to the mirrored half.
-constexpr int kNodes = 61;
-
-report::Frames frames_of(const CampaignFile& file, const RawRun& run) {
-  if (const auto ledger = ledger_of(file, run.id)) return {ledger->frames_emitted, ledger->frames_lost};
-  report::Frames frames{.emitted = run.frames};
-  for (const Gap& gap : gaps_of(file, run.id)) frames.lost += gap.frames_lost;
-  frames.emitted += frames.lost;
-  return frames;
-}
-
-/// Reduces and maps as far as the campaign allows, and keeps the reason where it does not.
-void derive(Material& material) {
-  try {
-    material.reduction = reduce_by(material.data, material.settings.model);
-    material.summary = summarize_locations(material.data, *material.reduction);
-  } catch (const InputError& error) {
-    material.reduction.reset();
-    material.not_reduced = error.what();
-    material.not_mapped = error.what();
-    return;
-  }
-  try {
-    const TunnelMaps maps = fit_maps(map_input(material.data, *material.summary, material.settings.db));
-    material.map = disturbance_map(maps, kNodes, "{}");
-  } catch (const InputError& error) {
-    material.not_mapped = error.what();
-  }
-}
-
-Material gather(const CampaignFile& file, const ReportSettings& settings,
-                const std::function<void(std::size_t, std::size_t)>& progress) {
-  Material material{.file = file, .settings = settings, .data = read_campaign_data(file)};
-  if (material.data.runs.empty() && !material.data.certificate) {
-    throw InputError::in(settings.db, "holds no runs and no calibration yet, so there is nothing to report");
-  }
-  derive(material);
-  for (const Run& run : material.data.runs) {
-    const auto raw = material.data.raw.find(run.run);
-    material.frames.push_back(raw == material.data.raw.end() ? report::Frames{}
-                                                             : frames_of(file, raw->second));
-  }
+Material examined(const CampaignFile& file, const ReportSettings& settings,
+                  const std::function<void(std::size_t, std::size_t)>& progress) {
+  Material material = report::gather(file, settings);
   material.findings = examine(file, material.data, progress);
   return material;
 }
@@ -108,10 +66,17 @@ ReportData report_data(const CampaignFile& file, const ReportSettings& settings,
                   {"db", settings.db},
                   {"model", settings.model.name()}}}};
   document.update(file.text("table.toml") ? table_document(file)
-                                          : campaign_document(gather(file, settings, progress)));
+                                          : campaign_document(examined(file, settings, progress)));
   if (Json models = report::model_section(file); !models.empty())
     document["sections"]["model"] = std::move(models);
-  if (!settings.flights.empty()) document["sections"]["flights"] = report::flights_section(settings.flights);
+  if (!settings.flights.empty()) {
+    Json flights = report::flights_section(settings.flights);
+    document["summary"]["flown"] = report::best_controller(flights);
+    document["sections"]["flights"] = std::move(flights);
+  } else {
+    document["summary"]["missing"].push_back(
+        "No flights were given, so there is no best controller (`--flights`).");
+  }
   ReportData data;
   for (const auto& [name, section] : document["sections"].items()) {
     if (section.contains("absent")) data.absent.push_back({name, section["absent"].get<std::string>()});

@@ -5,7 +5,7 @@
 #include "analysis/campaign_data.h"
 #include "analysis/health.h"
 #include "analysis/location_summary.h"
-#include "analysis/maps/disturbance_map.h"
+#include "analysis/maps/tunnel_maps.h"
 #include "analysis/report/report_data.h"
 #include "analysis/table_reduction.h"
 
@@ -32,13 +32,17 @@ struct Material {
   const ReportSettings& settings;
   CampaignData data;
   std::optional<Reduction> reduction;
-  std::optional<Summary> summary;     // with the reduction, or not at all
-  std::string not_reduced;            // why there is none
-  std::optional<DisturbanceMap> map;  // on the page's grid
+  std::optional<Summary> summary;    // with the reduction, or not at all
+  std::string not_reduced;           // why there is none
+  std::optional<TunnelMaps> fitted;  // with the map on the page's grid, or neither
+  std::optional<DisturbanceMap> map;
   std::string not_mapped;
   std::vector<Frames> frames;  // by run; zero where it has no raw data
   std::vector<Finding> findings;
 };
+
+/// All but the findings, which take the raw data to be read. Throws InputError for a file that holds nothing.
+Material gather(const CampaignFile& file, const ReportSettings& settings);
 
 /// What stands in a section's place.
 inline Json absent(const std::string& sentence) { return {{"absent", sentence}}; }
@@ -81,6 +85,11 @@ Json documents_section(const CampaignFile& file);
 /// flights.json of `tunnelrig fly --out`. Throws InputError naming file and rule for one that is not such a
 /// file.
 Json flights_section(const std::string& path);
+
+/// The controller with the fewest contacts and, among those, the smallest error, over all scenarios of such a
+/// section; null where no controller flew them all. With one scenario also its 95 % interval, and the
+/// controllers that the runs cannot tell from it.
+Json best_controller(const Json& section);
 
 Json table_section(const ObservationTable& table, const TableReduction& reduction);
 

@@ -110,6 +110,27 @@ TEST_F(BadInput, OptionsAndFilesThatAreNotThere) {
   EXPECT_THAT(refusal_of("log --db c.db --plan none.csv", {}), HasSubstr("none.csv: cannot be read"));
 }
 
+TEST_F(BadInput, AReportOfNothingAndFiguresThatNoPaperHas) {
+  EXPECT_THAT(refusal_of("report --db c.db", {}),
+              HasSubstr("--out FILE (the page), --figures FOLDER, or both"));
+  EXPECT_THAT(refusal_of("report --db c.db --figures f --format eps", {}),
+              HasSubstr("eps not in {pdf,svg,png}"));
+  EXPECT_THAT(refusal_of("report --db c.db --figures f --width-mm 20", {}),
+              HasSubstr("--width-mm: Value 20 not in range 60"));
+  campaign.write(folder / "source");
+  ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
+  write_text(folder / "flights.json", "{}");
+  EXPECT_THAT(refusal_of("report --db c.db --out r.html --figures f --flights flights.json",
+                         {"source", "c.db", "flights.json"}),
+              HasSubstr("flights.json: is no flights.json"));
+  EXPECT_THAT(refusal_of("report --db c.db --figures f", {"source", "c.db", "flights.json"}),
+              HasSubstr("there is no figure to draw: there is no calibration yet"));
+  ASSERT_EQ(test::run_program(folder.path(), "calibrate --db c.db").code, 0);
+  write_text(folder / "f", "");
+  EXPECT_THAT(refusal_of("report --db c.db --figures f", {"source", "c.db", "flights.json", "f"}),
+              HasSubstr("f: figures cannot be written here"));
+}
+
 TEST_F(BadInput, CalibrationThatSaysNothing) {
   campaign.calibration_csv =
       "cell,applied_force_N,voltage_V\n1,5,1.5\n1,6,1.8\n2,5,1.5\n2,6,1.8\n3,5,1.5\n3,6,1.8\n4,5,1.5\n4,6,1."

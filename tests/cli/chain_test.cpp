@@ -1,4 +1,4 @@
-// From bytes to a map with the program itself: what `./rig demo` does, with shorter runs.
+// From bytes to a map with the program itself: its demo, with shorter runs.
 #include "analysis/maps/disturbance_map.h"
 #include "cli/program.h"
 #include "datasets/csv.h"
@@ -63,16 +63,25 @@ class Grid {
 };
 
 TEST_F(Chain, DemoMakesAMapThatSatisfiesTheThesis) {
-  expect_well("plan --out plan.csv --duration 5");
-  expect_well("log --db c.db --plan plan.csv --speed max");
-  expect_well("calibrate --db c.db");
-  expect_well("reduce --db c.db --csv coefficients.csv --runs-csv runs.csv");
-  expect_well("reduce --db c.db --from-raw");
-  expect_well("map --db c.db --out maps");
-  expect_well("doctor --db c.db");
-  expect_well("report --db c.db --out report.html");
+  const ProgramResult demo = run("demo --out 'the demo' --duration 5");
+  EXPECT_EQ(demo.code, 0) << demo.error << demo.out;
+  EXPECT_THAT(
+      demo.out,
+      HasSubstr("$ tunnelrig reduce --db 'the demo/campaign.db' --csv 'the demo/coefficients.csv'\n"));
+  const auto lines = [&](const char* part) {
+    std::size_t found = 0;
+    for (auto at = demo.out.find(part); at != std::string::npos; at = demo.out.find(part, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(lines(" frames, "), 2u) << "the rest of the recording is in log.txt";
+  EXPECT_THAT(read_text(folder / "the demo/log.txt"), HasSubstr("R0700"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "the demo/report.html"));
+  const ProgramResult again = run("demo --out 'the demo'");
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.error, HasSubstr("the demo/campaign.db: is there already"));
+  expect_well("reduce --db 'the demo/campaign.db' --from-raw");
 
-  const Sheet coefficients = read_csv(folder / "coefficients.csv");
+  const Sheet coefficients = read_csv(folder / "the demo/coefficients.csv");
   const std::vector<std::string> first = {"location",      "y_norm",       "z_norm",  "runs",
                                           "c_t",           "c_t_std",      "c_t_u95", "u_percent",
                                           "u_percent_std", "u_percent_u95"};
@@ -92,11 +101,12 @@ TEST_F(Chain, DemoMakesAMapThatSatisfiesTheThesis) {
     }
   }
 
-  const Grid delta_ct(folder / "maps/delta_ct.csv"), uneven(folder / "maps/uneven_thrust.csv");
+  const Grid delta_ct(folder / "the demo/maps/delta_ct.csv"),
+      uneven(folder / "the demo/maps/uneven_thrust.csv");
   EXPECT_TRUE(delta_ct.holds_origin());
   test::expect_thesis_claims([&](double y, double z) { return delta_ct.at(y, z); },
                              [&](double y, double z) { return uneven.at(y, z); }, 0.35);
-  EXPECT_NO_THROW(read_disturbance_map(folder / "maps/disturbance_map.json"));
+  EXPECT_NO_THROW(read_disturbance_map(folder / "the demo/maps/disturbance_map.json"));
 }
 
 TEST_F(Chain, PlanResumesWhereItStopped) {
@@ -162,7 +172,7 @@ TEST_F(Chain, MeasuredConditionsEnterOnlyByName) {
 
 TEST_F(Chain, HelpOfEveryVerbShowsAnExample) {
   for (const char* verb :
-       {"log", "plan", "import", "export", "calibrate", "reduce", "map", "report", "doctor"}) {
+       {"demo", "log", "plan", "import", "export", "calibrate", "reduce", "map", "report", "doctor"}) {
     const ProgramResult help = run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0) << verb;
     EXPECT_THAT(help.out, HasSubstr("Example")) << verb;

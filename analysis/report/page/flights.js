@@ -56,6 +56,7 @@ function flightTable({controllers}) {
     {name: 'runs', cell: (row) => String(row.runs)},
     {name: 'rms y [mm]', cell: mm('rms_y_mm')},
     {name: 'rms z [mm]', cell: mm('rms_z_mm')},
+    {name: 'mean rms, 95 % [mm]', cell: ({ci95_rms_mm: ci}) => (ci ? `${fixed(ci[0], 1)} to ${fixed(ci[1], 1)}` : '–')},
     {name: 'max y [mm]', cell: mm('max_y_mm')},
     {name: 'max z [mm]', cell: mm('max_z_mm')},
     {name: 'contacts', cell: (row) => String(row.contacts)},
@@ -73,7 +74,7 @@ function flightsSection({flights, command}) {
       const {tunnel, scenario, map, position} = flight;
       const title = `${scenario} in the ${tunnel} tunnel`;
       const caption = `The first run of each controller; map: ${map}; position: ${
-          position === 'lidar' ? 'from LIDAR scans, matcher and filter' : 'given'}. A click on the legend hides or shows.`;
+          position === 'lidar' ? 'from LIDAR scans, matcher and filter' : 'given'}. Single runs have no error bars; the intervals of the table are Student’s, over the runs. A click on the legend hides or shows.`;
       return figure(title, [], [
         plot(`Paths, ${title}`, (width) => Math.min(560, Math.max(380, 0.7 * width)), (width) => drawPaths(flight, width)),
         plot(`Error in y, ${title}`, () => 260, () => drawFlightErrors(flight, 'y_m', 'y')),

@@ -25,9 +25,13 @@ function originOfRuns({simulated, measured, unknown}) {
 
 const percent = ({value, u95}) => `${withU95(value, u95, true)} %`;
 
+/** "H4V-2 (ȳ = 0.80, z̄ = −0.40)" */
+const place = ({location, y_norm: y, z_norm: z}) =>
+    (known(y) ? `${location} (ȳ = ${fixed(y, 2)}, z̄ = ${fixed(z, 2)})` : location);
+
 function changeOfThrust({greatest_delta_ct_percent: most, least_delta_ct_percent: least}) {
   if (!most) return '';
-  const up = `${percent(most)} (at ${most.location})`, down = `${percent(least)} (at ${least.location})`;
+  const up = `${percent(most)} at ${place(most)}`, down = `${percent(least)} at ${place(least)}`;
   return `Against OT, C_T changes by up to ${up} and down to ${down}.`;
 }
 
@@ -35,7 +39,36 @@ function unevenThrust({greatest_uneven_percent: uneven}) {
   if (!uneven) return '';
   const side = uneven.value < 0 ? 'right' : 'left';
   const value = `${percent(uneven)}, the ${side} pair lifting less`;
-  return `The uneven thrust U is largest at ${uneven.location}: ${value}.`;
+  return `The uneven thrust U is largest at ${place(uneven)}: ${value}.`;
+}
+
+/** What the model in force corrects for, and what that gained. */
+function modelInForce({model}) {
+  if (!model) return '';
+  const {effects, before, after, noise_floor: floor, unit} = model;
+  const error = (e) => `${digits(e.held_out_rmse)} ${bracket(e.held_out_ci95)}`;
+  const gain = before && after ?
+      ` On blocks held out, the error is ${error(before)} before and ${error(after)}${unitSuffix(unit)} after ` +
+          `(95 % intervals)${known(floor) ? `; no model can come below ${digits(floor)}${unitSuffix(unit)}` : ''}.` :
+      '';
+  return `${counted(effects.length, 'effect')} adopted: ${effects.join(', ')}.${gain}`;
+}
+
+const contactsOf = (n) => (n ? counted(n, 'contact') : 'no contact');
+
+function bestController({flown}) {
+  if (!flown) return flown === null ? 'No controller flew all scenarios, so none is the best.' : '';
+  const {scenarios, controllers, name, rms_mm: rms, contacts} = flown;
+  const among = `Of ${counted(controllers, 'controller')}, flown in simulation through`;
+  if (scenarios > 1) {
+    return `${among} ${scenarios} scenarios, ${name} does best: ${fixed(rms, 1)} mm rms error over all, ${
+        contactsOf(contacts)}; it is first, or not told apart from the first, in ${flown.first_in} of them.`;
+  }
+  const {ci95_mm: interval, as_good: others} = flown;
+  const bar = interval ? ` (mean over the runs, 95 %: ${fixed(interval[0], 1)} to ${fixed(interval[1], 1)} mm)` : '';
+  const ties = others.length ? `; the runs do not tell it from ${others.join(', ')}` : '';
+  return `${among} ${flown.scenario} in the ${flown.tunnel} tunnel, ${name} does best: ${
+      fixed(rms, 1)} mm rms error${bar}, ${contactsOf(contacts)}${ties}.`;
 }
 
 function losses({frames_emitted: emitted, frames_lost: lost}) {
@@ -60,7 +93,7 @@ function summaryText(summary) {
   return sentences(
       runs, reduced ? `${coefficients()} give coefficients.` : 'none gives coefficients yet.',
       c_t.length && `C_T is ${c_t.join(' and ')}.`, changeOfThrust(summary), unevenThrust(summary),
-      losses(summary), verdict(summary),
+      modelInForce(summary), bestController(summary), losses(summary), verdict(summary), ...summary.missing,
       reduced && 'Every ± on this page is U95, which holds the value with 95 % probability.');
 }
 
@@ -69,6 +102,7 @@ function headOfCampaign() {
   return [
     h('p', {class: `origin ${kind}`}, prose(text)),
     h('p', {class: 'summary'}, prose(summaryText(report.summary))),
+    h('p', {class: 'soft'}, 'As figures for a paper, 84 mm wide: ', code(command('report', '--figures figures'))),
   ];
 }
 
@@ -80,7 +114,8 @@ function headOfTable() {
   return [
     h('p', {class: 'origin unknown'},
       'A table of observations made elsewhere: this program recorded none of them.'),
-    h('p', {class: 'summary'}, prose(`${rows}${table.absent ? '' : groups()}.`)),
+    h('p', {class: 'summary'}, prose(sentences(
+        `${rows}${table.absent ? '' : groups()}.`, bestController(report.summary), ...report.summary.missing ?? []))),
   ];
 }
 

@@ -209,4 +209,12 @@ nlohmann::ordered_json explanation(const std::string& verdict) {
       .patch({{{"op", "replace"}, {"path", "/verdict"}, {"value", verdict}}});
 }
 
+ModelVersion adopted_model() {
+  ModelVersion version{.version = 1, .explanation = explanation("explained").dump()};
+  version.curves = {
+      {.covariate = "air_temperature_C", .low = 10, .high = 30, .coefficients = {0.02}, .centre = {0.5}}};
+  version.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-6);
+  return version;
+}
+
 }  // namespace tunnelrig::test

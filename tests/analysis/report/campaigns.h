@@ -1,5 +1,7 @@
 #pragma once
 
+#include "analysis/model/model_version.h"
+
 #include <filesystem>
 #include <string>
 
@@ -31,5 +33,8 @@ void make_table(const std::filesystem::path& db, bool with_thrust = true);
 
 /// What a stored model holds of its explanation, with a verdict.
 nlohmann::ordered_json explanation(const std::string& verdict);
+
+/// A version of the model that takes a curve over the air temperature out, with that explanation.
+ModelVersion adopted_model();
 
 }  // namespace tunnelrig::test

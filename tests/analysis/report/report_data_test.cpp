@@ -5,6 +5,7 @@
 #include "analysis/report/render.h"
 #include "analysis/table_reduction.h"
 #include "campaigns.h"
+#include "datasets/csv.h"
 #include "datasets/error.h"
 #include "support/message_of.h"
 #include "support/temporary_folder.h"
@@ -238,6 +239,102 @@ TEST_F(ReportTest, AdoptedModelsComeWithTheirExplanations) {
   EXPECT_EQ(models[0]["arguments"], "tunnelrig explain --adopt");
   EXPECT_EQ(models[0]["explanation"], test::explanation("confounded"));
   EXPECT_EQ(models[1]["explanation"]["verdict"], "explained");
+}
+
+TEST_F(ReportTest, TheSummarySaysWhereAndWhatIsMissing) {
+  const Json summary = json({})["summary"];
+  const Reduced expected(db);
+  const DisturbanceMap map =
+      disturbance_map(fit_maps(map_input(expected.data, expected.summary, "c.db")), 41, "{}");
+  for (const auto& [key, sign] :
+       {std::pair{"greatest_delta_ct_percent", 1}, {"least_delta_ct_percent", -1}}) {
+    const MeasuredLocation* most = &map.locations[0];
+    for (const MeasuredLocation& location : map.locations)
+      if (sign * location.delta_ct_percent > sign * most->delta_ct_percent) most = &location;
+    EXPECT_EQ(summary[key]["location"], most->label);
+    EXPECT_EQ(summary[key]["value"].get<double>(), most->delta_ct_percent);
+    EXPECT_EQ(summary[key]["u95"].get<double>(), most->delta_ct_u95_percent);
+    EXPECT_EQ(summary[key]["y_norm"].get<double>(), most->y_norm);
+    EXPECT_EQ(summary[key]["z_norm"].get<double>(), most->z_norm);
+  }
+  EXPECT_TRUE(summary["greatest_uneven_percent"].contains("y_norm"));
+  ASSERT_EQ(summary["missing"].size(), 2u);
+  EXPECT_THAT(summary["missing"][0].get<std::string>(), HasSubstr("explain --adopt"));
+  EXPECT_THAT(summary["missing"][1].get<std::string>(), HasSubstr("--flights"));
+}
+
+TEST_F(ReportTest, TheSummarySaysWhatIsMissingOfAPartialCampaign) {
+  const Json none = json({.calibrated = false})["summary"];
+  EXPECT_THAT(none["missing"][0].get<std::string>(), HasSubstr("There are no coefficients"));
+  std::filesystem::remove(db);
+  std::filesystem::remove_all(folder / "c.db.folder");
+  const Json unmapped = json({.raw_data = false, .rotors = 1})["summary"];
+  EXPECT_THAT(unmapped["missing"][0].get<std::string>(), HasSubstr("no maximum of ΔC_T"));
+  EXPECT_THAT(unmapped["missing"][1].get<std::string>(), HasSubstr("no uneven thrust"));
+}
+
+TEST_F(ReportTest, TheSummaryHasTheModelInForce) {
+  make_campaign(db, {.raw_data = false});
+  const ModelVersion version = test::adopted_model();
+  const CampaignFile file(db, CampaignFile::Access::kRead);
+  const Json page = Json::parse(report_data(file, {.db = "c.db", .model = {{}, version}}).json);
+  const Json& model = page["summary"]["model"];
+  EXPECT_EQ(model["effects"], Json(version.effects()));
+  EXPECT_EQ(model["before"], test::explanation("explained")["before"]);
+  EXPECT_EQ(model["after"], test::explanation("explained")["after"]);
+  EXPECT_EQ(model["unit"], "N");
+}
+
+/// One flight of three controllers: rms of y and z, contacts, interval.
+Json flight(const std::string& scenario, const std::vector<std::tuple<std::string, double, int>>& flown) {
+  const Json path{{"time_s", {0, 0.1}}, {"y_m", {0, 0}}, {"z_m", {0.75, 0.75}}};
+  Json json{{"tunnel", "1.5"},     {"scenario", scenario},      {"map", "m.json"},
+            {"position", "lidar"}, {"walls", {{0, 0}, {1, 0}}}, {"reference", path}};
+  for (const auto& [name, rms_mm, contacts] : flown) {
+    json["controllers"].push_back({{"name", name},
+                                   {"runs", 5},
+                                   {"rms_y_mm", 0.6 * rms_mm},
+                                   {"rms_z_mm", 0.8 * rms_mm},
+                                   {"max_y_mm", 9},
+                                   {"max_z_mm", 9},
+                                   {"ci95_rms_mm", {rms_mm - 1, rms_mm + 1}},
+                                   {"contacts", contacts},
+                                   {"estimator_rms_mm", 1},
+                                   {"thrust_saturated_s", 0},
+                                   {"path", path}});
+  }
+  return json;
+}
+
+struct BestController : ReportTest {
+  Json best(const std::vector<Json>& flights) const {
+    write_text(
+        folder / "flights.json",
+        Json{{"format", "tunnelrig-flights/1"}, {"command", "tunnelrig fly"}, {"flights", flights}}.dump());
+    if (!std::filesystem::exists(db)) make_campaign(db, {.raw_data = false});
+    const CampaignFile file(db, CampaignFile::Access::kRead);
+    const ReportSettings settings{.db = "c.db", .flights = (folder / "flights.json").string()};
+    return Json::parse(report_data(file, settings).json)["summary"]["flown"];
+  }
+};
+
+TEST_F(BestController, TouchesNothingAndErrsLeast) {
+  const Json one =
+      best({flight("hover", {{"fast", 5, 2}, {"ibs", 10, 0}, {"pid", 11.5, 0}, {"lag", 20, 0}})});
+  EXPECT_EQ(one["name"], "ibs") << "a smaller error with contacts is not better";
+  EXPECT_NEAR(one["rms_mm"].get<double>(), 10, 1e-9);
+  EXPECT_EQ(one["ci95_mm"], Json({9.0, 11.0}));
+  EXPECT_EQ(one["as_good"], Json({"pid"})) << "[10.5, 12.5] and [9, 11] overlap";
+  EXPECT_EQ(one["controllers"], 4);
+}
+
+TEST_F(BestController, IsJudgedOverAllScenarios) {
+  const Json both = best({flight("hover", {{"a", 10, 0}, {"b", 20, 0}, {"only", 1, 0}}),
+                          flight("circle", {{"a", 40, 0}, {"b", 20, 0}})});
+  EXPECT_EQ(both["name"], "b") << "29 mm against 20 mm; what flew once only does not count";
+  EXPECT_EQ(both["first_in"], 1);
+  EXPECT_EQ(both["scenarios"], 2);
+  EXPECT_TRUE(best({flight("hover", {{"a", 10, 0}}), flight("circle", {{"b", 20, 0}})}).is_null());
 }
 
 TEST_F(ReportTest, NothingToReportIsRefused) {

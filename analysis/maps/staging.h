@@ -1,0 +1,30 @@
+// Files that appear all or none: made in a scratch folder first, then renamed to their place.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace tunnelrig {
+
+/// A scratch folder within the target, so that renaming out of it stays on one file system; gone afterwards.
+class Staging {
+ public:
+  /// Makes the target where it is missing. Throws InputError naming it where that cannot be, with `what` is
+  /// not to be written ("maps").
+  Staging(const std::filesystem::path& target, const std::string& what);
+  ~Staging();
+  Staging(const Staging&) = delete;
+  Staging& operator=(const Staging&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+  /// Renames files of the scratch folder into the target, after a look at what alone could stop that
+  /// half-way. Returns where they are now; throws InputError naming the file that is in the way.
+  std::vector<std::filesystem::path> publish(const std::vector<std::string>& names) const;
+
+ private:
+  std::filesystem::path target_, path_;
+};
+
+}  // namespace tunnelrig
