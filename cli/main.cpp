@@ -29,7 +29,7 @@ int run(int argc, char** argv) {
   app.get_formatter()->column_width(34);
   Work work;
   for (const auto add : {add_log, add_plan, add_import, add_export, add_calibrate, add_reduce, add_map,
-                         add_report, add_devices, add_doctor, add_explain, add_models, add_fly}) {
+                         add_report, add_serve, add_devices, add_doctor, add_explain, add_models, add_fly}) {
     add(app, work);
   }
   try {

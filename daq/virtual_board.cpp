@@ -67,6 +67,7 @@ void VirtualBoard::step() {
     const double held_s = static_cast<double>(ring_.size() * kFramesPerPacket) / settings_.frame_rate_hz;
     lost_some_ = held_s >= kRing_s;
     if (!lost_some_) ring_.push_back(std::move(packet));
+    ring_peak_ = std::max<std::uint64_t>(ring_peak_, ring_.size() * kFramesPerPacket);
   }
   clock_frames_ += kFramesPerPacket;
   for (; link_open() && !ring_.empty(); ring_.pop_front()) send(std::move(ring_.front()));
