@@ -123,9 +123,10 @@ void add_log(CLI::App& app, Work& work) {
       ->expected(0, 1)
       ->check(CLI::Range(0, 65535))
       ->type_name("[PORT]");
-  verb->add_option("--listen", options->listen,
-                   "With --live: the address of this computer to listen on, where the loopback is not enough; "
-                   "it takes a token then");
+  verb->add_option(
+      "--listen", options->listen,
+      "With --live: the address of this computer to listen on, where the loopback is not enough; "
+      "it takes a token then");
   verb->add_option(
       "--faults", options->faults,
       "Virtual rig: "

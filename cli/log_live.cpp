@@ -208,22 +208,22 @@ class LiveLogging {
     apply_metadata();
     bool begun = false;
     complete_ = false;
-    const LogWatch watch{.frames = &page_.feed().watcher(),
-                         .begun = [&](const RunCells& cells) { begin(planned, cells); },
-                         .progress =
-                             [&](const LogProgress& progress) {
-                               page_.feed().progress(progress);
-                               if (std::exchange(begun, true)) return;
-                               page_.book().look();  // its row is in the file now
-                               if (order != nullptr)
-                                 order->answer(
-                                     {.problem = "", .text = fmt::format("{} is being recorded", here_.run)});
-                             },
-                         .ended =
-                             [&](const std::string& run, const LogOutcome& outcome) {
-                               complete_ = outcome.state == RunState::kComplete;
-                               mark_alarms(logging_.file(), run, page_.feed().end(outcome));
-                             }};
+    const LogWatch watch{
+        .frames = &page_.feed().watcher(),
+        .begun = [&](const RunCells& cells) { begin(planned, cells); },
+        .progress =
+            [&](const LogProgress& progress) {
+              page_.feed().progress(progress);
+              if (std::exchange(begun, true)) return;
+              page_.book().look();  // its row is in the file now
+              if (order != nullptr)
+                order->answer({.problem = "", .text = fmt::format("{} is being recorded", here_.run)});
+            },
+        .ended =
+            [&](const std::string& run, const LogOutcome& outcome) {
+              complete_ = outcome.state == RunState::kComplete;
+              mark_alarms(logging_.file(), run, page_.feed().end(outcome));
+            }};
     placed_.reset();
     code_ = std::max(code_, logging_.record(planned, "", watch));
     if (!quit_requested) stop_requested = false;

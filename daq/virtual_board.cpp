@@ -153,7 +153,9 @@ ReadResult VirtualBoard::read(std::span<std::byte> buffer, std::chrono::millisec
     arrived_.clear();
     read_ = 0;
   }
-  const double time_s = settings_.pace > 0 ? steady_seconds() : board_time_s();
+  // By the rig's own time, so that a clock that is held against it runs right at any pace.
+  const double time_s =
+      settings_.pace > 0 ? (steady_seconds() - started_s_) * settings_.pace : board_time_s();
   return {size > 0 ? ReadResult::Status::kData : ReadResult::Status::kNothing, size, time_s};
 }
 

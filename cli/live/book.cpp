@@ -27,7 +27,16 @@ std::string fingerprint(const Reduction& reduction) {
 }  // namespace
 
 CellKnowledge cells_of(const CampaignData& data) {
-  CellKnowledge cells{.certificate = data.certificate, .tares = {}};
+  CellKnowledge cells;
+  if (data.certificate) {
+    cells.cells.emplace();
+    for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
+      const CellFit& fit = data.certificate->cells.at(static_cast<std::size_t>(rotor));
+      const ForceReading force = data.certificate->force(rotor + 1, 0);
+      (*cells.cells)[static_cast<std::size_t>(rotor)] = {
+          force.d_voltage_N_per_V / data.certificate->propellers.factor(rotor), fit.zero_V};
+    }
+  }
   for (const Run& run : data.runs) {
     const auto statistics = data.statistics.find(run.run);
     const auto raw = data.raw.find(run.run);

@@ -44,8 +44,12 @@ LiveFeed::View::View(const CampaignInfo& info, const LiveRun& of, std::uint32_t 
       watch(whole_frames(1, info), info.daq.highest_count()),
       window(kSpectrumFrames) {}
 
-LiveFeed::LiveFeed(CampaignInfo info, std::filesystem::path campaign, Viewers& viewers)
-    : info_(std::move(info)), campaign_(std::move(campaign)), viewers_(viewers), ring_(kRingFrames) {
+LiveFeed::LiveFeed(CampaignInfo info, std::filesystem::path campaign, Viewers& viewers, MeansFunction means)
+    : info_(std::move(info)),
+      campaign_(std::move(campaign)),
+      viewers_(viewers),
+      means_(std::move(means)),
+      ring_(kRingFrames) {
   thread_ = std::thread([this] { work(); });
 }
 

@@ -35,7 +35,7 @@ struct Target {
 /// rather than waits; the rest is a few numbers five times a second.
 class LiveFeed {
  public:
-  LiveFeed(CampaignInfo info, std::filesystem::path campaign, Viewers& viewers);
+  LiveFeed(CampaignInfo info, std::filesystem::path campaign, Viewers& viewers, MeansFunction means);
   ~LiveFeed();
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
@@ -108,6 +108,7 @@ class LiveFeed {
   CampaignInfo info_;
   std::filesystem::path campaign_;
   Viewers& viewers_;
+  MeansFunction means_;
   FrameRing ring_;
 
   mutable std::mutex mutex_;  // guards shared_, alarms_ and stopping_

@@ -56,7 +56,7 @@ std::string LiveFeed::state_json(const Shared& now, const Scale& scale) const {
           : Json(std::chrono::duration<double>(std::chrono::steady_clock::now() - tared->second).count());
   RunningMeans means;
   if (view_ && view_->run.run == position.run.run)
-    means = running_means(view_->blocks, scale, info_, view_->run.air_temperature_C);
+    means = means_(view_->blocks, scale, info_, view_->run.air_temperature_C);
   json["means"] = Json::array();
   for (int rotor = 0; rotor < info_.rig.rotors; ++rotor) {
     const auto i = static_cast<std::size_t>(rotor);

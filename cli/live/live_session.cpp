@@ -22,7 +22,7 @@ std::string own_name() {
 LiveSession::LiveSession(LiveSettings settings, std::atomic<bool>& stop)
     : settings_(std::move(settings)),
       server_(std::make_unique<HttpServer>(settings_.address, settings_.port)) {
-  feed_ = std::make_unique<LiveFeed>(settings_.info, settings_.campaign, viewers_);
+  feed_ = std::make_unique<LiveFeed>(settings_.info, settings_.campaign, viewers_, running_means);
   book_ = std::make_unique<Book>(BookSettings{settings_.campaign, settings_.plan, !settings_.writable},
                                  viewers_, *feed_);
   desk_ = std::make_unique<Desk>(settings_.campaign, *feed_, *book_, stop, [this] { say_hello(); });

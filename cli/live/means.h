@@ -4,6 +4,7 @@
 #include "cli/live/scale.h"
 #include "daq/live/running_blocks.h"
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -18,6 +19,10 @@ struct RunningMeans {
   std::vector<KnownMean> rotors;  // newtons or volts
   std::optional<KnownMean> c_t, u_percent;
 };
+
+/// How the feed has them computed: by running_means, which needs more of the analysis than the feed does.
+using MeansFunction = std::function<RunningMeans(const RunningBlocks&, const Scale&, const CampaignInfo&,
+                                                 std::optional<double> air_temperature_C)>;
 
 /// U95 of the run's own noise (run_summary's block means and Geyer's sequence), without calibration. C_T
 /// needs newtons and the air's temperature; both need a positive total. Rotors that move together count as

@@ -2,21 +2,19 @@
 
 namespace tunnelrig::live {
 
-Scale scale_of(const CellKnowledge& cells, const CampaignInfo& info, const std::string& session) {
-  Scale scale{.newtons = cells.certificate.has_value()};
+Scale scale_of(const CellKnowledge& knowledge, const CampaignInfo& info, const std::string& session) {
+  Scale scale{.newtons = knowledge.cells.has_value()};
   const double volts = info.daq.volts_per_count();
-  const auto tare = cells.tares.find(session);
-  for (int rotor = 0; rotor < info.rig.rotors; ++rotor) {
-    const auto i = static_cast<std::size_t>(rotor);
-    if (!cells.certificate) {
+  const auto tare = knowledge.tares.find(session);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(info.rig.rotors); ++i) {
+    if (!knowledge.cells) {
       scale.slope[i] = volts;
       continue;
     }
-    const auto zero = tare == cells.tares.end() ? std::nullopt : std::optional(tare->second.mean_V[i]);
-    const double factor = cells.certificate->propellers.factor(rotor);
-    const ForceReading at_zero = cells.certificate->force(rotor + 1, 0, zero);
-    scale.slope[i] = at_zero.d_voltage_N_per_V * volts / factor;
-    scale.offset[i] = at_zero.force_N / factor;
+    const CellKnowledge::Cell& cell = (*knowledge.cells)[i];
+    const double zero_V = tare == knowledge.tares.end() ? cell.zero_V : tare->second.mean_V[i];
+    scale.slope[i] = cell.newtons_per_V * volts;
+    scale.offset[i] = -cell.newtons_per_V * zero_V;
   }
   return scale;
 }

@@ -1,7 +1,6 @@
 // From a channel's counts to what the page shows: newtons where there is a calibration, volts before.
 #pragma once
 
-#include "calibration/certificate.h"
 #include "datasets/campaign.h"
 
 #include <array>
@@ -19,7 +18,12 @@ struct CellKnowledge {
     double drift_V = 0;   // largest change of a channel against the session's tare before
     int drift_rotor = 0;  // 0: there was none before
   };
-  std::optional<Certificate> certificate;
+  /// A calibrated cell: thrust = (voltage − zero) · newtons_per_V, over the factor of its propeller already.
+  struct Cell {
+    double newtons_per_V = 0;
+    double zero_V = 0;  // the certificate's, where the session has no tare
+  };
+  std::optional<std::array<Cell, kMaxRotors>> cells;
   std::map<std::string, Tare> tares;  // the last complete one of each session
 };
 
@@ -34,6 +38,6 @@ struct Scale {
 
 /// By the certificate and the session's last tare, as the reduction does it; the thrust of a propeller is
 /// over its factor.
-Scale scale_of(const CellKnowledge& cells, const CampaignInfo& info, const std::string& session);
+Scale scale_of(const CellKnowledge& knowledge, const CampaignInfo& info, const std::string& session);
 
 }  // namespace tunnelrig::live
