@@ -71,9 +71,13 @@ const since = (utcText) => {
 
 const alarmKey = ({kind, rotor}) => `${kind} ${rotor ?? ''}`;
 
+/** "Rotor 2: 12 samples …" */
+const alarmText = ({rotor, text}) =>
+    (rotor ? `Rotor ${rotor}: ${text}` : text[0].toUpperCase() + text.slice(1));
+
 const alarmItem = (alarm) =>
-    h('li', {}, h('span', {class: 'sign', 'aria-hidden': 'true'}, '⚠'), ' ', h('strong', {}, alarm.text), ' ',
-      h('span', {class: 'since'}, since(alarm.since_utc)));
+    h('li', {}, h('span', {class: 'sign', 'aria-hidden': 'true'}, '⚠'), ' ',
+      h('strong', {}, alarmText(alarm)), ' ', h('span', {class: 'since'}, since(alarm.since_utc)));
 
 function startAlarms() {
   const none = h('p', {class: 'none'}, '✓ No alarms');

@@ -8,36 +8,35 @@ const phases = {
 };
 
 /** "Recording R0012 at H4V-2 (session S2, repeat 3)" */
-function runText({phase, run, location, session, repeat, kind}) {
+function runText({phase, run, location, next_location: next, session, repeat, kind}) {
   const name = phases[phase] ?? phase;
-  const what = kind === 'tare' ? 'tare' : location;
-  const details = [
-    session && `session ${session}`, kind !== 'tare' && known(repeat) && `repeat ${repeat}`
-  ].filter(Boolean);
-  const where = what ? `${what}${details.length ? ` (${details.join(', ')})` : ''}` : '';
-  if (phase === 'recording') return `${name} ${run} at ${where}`;
-  if (phase === 'waiting') return `${name}: bring the rig to ${where}, then Next`;
-  return run ? `${name}; last run ${run} at ${where}` : `${name}; no run yet`;
+  const details = [session && `session ${session}`, kind !== 'tare' && known(repeat) && `repeat ${repeat}`];
+  const where = `${kind === 'tare' ? 'tare at ' : ''}${location} (${details.filter(Boolean).join(', ')})`;
+  if (phase === 'recording') return `${name} ${run}: ${where}`;
+  if (phase === 'waiting') return `${name}: bring the rig to ${next ?? 'the next location'}, then press Next`;
+  return run ? `${name}; the last run was ${run}: ${where}` : `${name}; no run yet`;
 }
 
 /** What a new run is, where the plan does not say it. */
 function startForm(hello) {
   const fields = {
     location: field('Location', 'label: OT, H4V-2, OS, GND1.25 …', {maxlength: '64', required: ''}),
-    session: field('Session', 'one set-up of the rig on one day', {maxlength: '64', required: ''}),
-    repeat: field('Repeat', '', {type: 'number', min: '1', step: '1', value: '1', required: ''}),
+    session: field('Session', 'empty: the one under way', {maxlength: '64'}),
+    repeat: field('Repeat', 'empty: the next', {type: 'number', min: '1', step: '1'}),
     kind: field('Kind', '', {}, ['thrust', 'tare']),
-    duration_s: field('Duration [s]', '', {type: 'number', min: '0', step: 'any', value: '60', required: ''}),
+    duration_s: field('Duration [s]', 'empty: as --duration says', {type: 'number', min: '0', step: 'any'}),
   };
   const form =
       h('form', {class: 'start'}, Object.values(fields).map((f) => f.place),
         h('button', {type: 'submit', class: 'main'}, 'Start this run'));
-  const values = () => Object.fromEntries(Object.entries(fields).map(
-      ([name, {input}]) => [name, input.type === 'number' ? Number(input.value) : input.value.trim()]));
-  form.addEventListener('submit', async (event) => {
+  const entered = () => Object.fromEntries(
+      Object.entries(fields)
+          .filter(([, {input}]) => input.value.trim() !== '')
+          .map(([name,
+                 {input}]) => [name, input.type === 'number' ? Number(input.value) : input.value.trim()]));
+  form.addEventListener('submit', (event) => {
     event.preventDefault();
-    if (await send('start', values(), 'Started.'))
-      fields.repeat.input.value = String(Number(fields.repeat.input.value) + 1);
+    send('start', entered(), 'Started.');
   });
   form.hidden = !hello.writable;
   return {form, fields};
@@ -123,8 +122,16 @@ function makeButtons() {
   });
 }
 
+/** What somebody at the rig most likely does next. */
+const expected = {
+  idle: 'Start',
+  waiting: 'Next',
+  recording: 'Stop'
+};
+
 function showButtons() {
-  for (const {button, why} of actions) {
+  for (const {name, button, why} of actions) {
+    setClass(button, 'main', expected[controls.state.phase] === name);
     const readOnly =
         controls.writable ? '' : 'The page shows a file, read-only: nothing can be recorded from here.';
     refuse(button, !link.connected ? 'There is no connection to the server.' : readOnly || why());

@@ -41,11 +41,15 @@ function svg(tag, attributes = {}, ...children) {
   return element;
 }
 
-/** What came of a command or a key, below the buttons. */
+let forget;
+
+/** What came of a command or a key, at the window's foot for a while. */
 function say(text, well = true) {
   const line = byId('said');
   line.className = well ? 'well' : 'not-well';
   line.textContent = text;
+  clearTimeout(forget);
+  forget = setTimeout(() => (line.textContent = ''), well ? 6000 : 15_000);
 }
 
 /** A button that stays reachable by keyboard when it cannot be used: it then says why. */

@@ -22,8 +22,9 @@ function showHead({campaign, program, mode, source, simulated, writable}) {
       ...(simulated ? [badge('note', 'simulated: no rig is behind this'), ' '] : []),
       ...(writable ? [] : [badge('note', 'read-only'), ' ']),
       [program, mode === 'file' ? 'campaign file' : `source ${source}`].filter(Boolean).join(', '));
-  byId('measurement').hidden = byId('signal').hidden = byId('run').hidden = mode === 'file';
-  document.body.dataset.mode = mode;
+  const needsRig = ['alarms', 'sound', 'run', 'measurement', 'signal', 'metadata'];
+  for (const id of needsRig) byId(id).hidden = mode === 'file';
+  setClass(byId('metadata').parentElement, 'alone', mode === 'file');
 }
 
 /** The window's title tells the run and alarms while the page stands behind others. */

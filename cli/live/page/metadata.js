@@ -21,8 +21,7 @@ const typed = ({input}) => (input.value.trim() === '' ? null : Number(input.valu
 
 function startMetadata() {
   const form = h('form', {class: 'metadata'});
-  const none = h('p', {class: 'absent'}, 'The page shows the file as it is; nothing can be entered here.');
-  byId('metadata').append(none, form);
+  byId('metadata').append(form);
   let fields = [];
   form.addEventListener('submit', async (event) => {
     event.preventDefault();
@@ -32,9 +31,7 @@ function startMetadata() {
     if (await send('metadata', {values}, 'The conditions hold from the next run on.'))
       edited.forEach((f) => f.forget());
   });
-  on('hello', ({metadata, writable}) => {
-    form.hidden = !writable;
-    none.hidden = writable;
+  on('hello', ({metadata}) => {
     const names = (list) => list.map(({name}) => name).join();
     if (names(fields.map((f) => f.quantity)) !== names(metadata ?? [])) {
       fields = (metadata ?? []).map(metadataField);

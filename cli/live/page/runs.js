@@ -29,8 +29,7 @@ async function redo(run) {
 const smallButton = (text, run, act) =>
     h('button', {type: 'button', class: 'small', 'aria-label': `${text} ${run}`, click: act}, text);
 
-function actionsOn({run, excluded}, writable) {
-  if (!writable) return '–';
+function actionsOn({run, excluded}) {
   return h(
       'span', {class: 'actions'}, smallButton('Note', run, () => noteOn(run)),
       smallButton('Redo', run, () => redo(run)),
@@ -57,7 +56,7 @@ const runColumns = (writable) =>
      {name: 'Frames', cell: (r) => (r.frames ?? 0).toLocaleString('en')},
      {name: 'Lost', cell: (r) => (r.lost ?? 0).toLocaleString('en')},
      {name: 'Remarks', cell: remarksOn, text: true},
-     {name: 'Actions', cell: (r) => actionsOn(r, writable), text: true},
+     ...(writable ? [{name: 'Actions', cell: actionsOn, text: true}] : []),
 ];
 
 /** The buttons are made anew with the table; the one that had the focus gets it back. */

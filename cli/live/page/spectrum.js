@@ -130,6 +130,16 @@ function startSpectrum() {
             h('span', {}, h('span', {class: `marker rotor-${i + 1}`, 'aria-hidden': 'true'}),
               `Rotor ${i + 1} `)));
   });
+  let run = null;
+  on('state', (state) => {
+    if (state.run === run) return;  // else what is shown is another run's
+    run = state.run;
+    spectrum.latest = null;
+    makeSpectrumPlot();
+    none.hidden = false;
+    lines.dataset.shown = '';
+    lines.replaceChildren();
+  });
   on('spectrum', (latest) => {
     none.hidden = true;
     receiveSpectrum(latest);
