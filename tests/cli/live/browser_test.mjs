@@ -152,6 +152,7 @@ step('the server is killed in the middle of a run; the page says since when, and
   await reads(page(), '#connection', /Disconnected since \d\d:\d\d:\d\d/);
   await page().keyboard.press('x');
   await reads(page(), '#said', /no connection/);
+  await inspect(page(), 'disconnected', [{width: 1280, scheme: 'light'}]);
   set.logger = await startLogger(set.port, '--faults', 'drop=0.05');
   await until(page(), 'the connection', ({connected, phase}) => connected && phase === 'waiting');
   await reads(page(), '#runs', /R0018[^]*partial/);
@@ -179,7 +180,7 @@ step('nothing was complained of and nothing asked of others', async () => {
 });
 
 step('the page over a file shows it and cannot change it', async () => {
-  const reader = await startReader();
+  const reader = await startReader(0);
   const {page: read, complaints} = await open(set.browser, reader.address);
   await until(read, 'the campaign', ({runs, maps}) => runs === 19 && maps === 2);
   assert.match(await text(read, '#facts'), /read-only/);
@@ -190,6 +191,19 @@ step('the page over a file shows it and cannot change it', async () => {
   const old =
       await open(set.browser, reader.address, (p) => p.addInitScript(() => delete window.EventSource));
   assert.match(await text(old.page, '#unsupported'), /server-sent events/);
+  await reader.kill('SIGINT');
+});
+
+step('from elsewhere the address holds a token; a restart changes it, and the page says so', async () => {
+  let reader = await startReader(0, '--listen', '0.0.0.0');
+  const given = new URL(reader.address);
+  given.hostname = '127.0.0.1';  // this computer's name may lead nowhere here
+  const {page: far} = await open(set.browser, given.href);
+  await until(far, 'the campaign', ({connected, runs}) => connected && runs === 19);
+  assert.equal((await fetch(given.origin)).status, 403);
+  await reader.kill('SIGKILL');
+  reader = await startReader(Number(given.port), '--listen', '0.0.0.0');
+  await reads(far, '#connection', /Refused: .*another token/);
   await reader.kill('SIGINT');
 });
 

@@ -63,4 +63,5 @@ export const startLogger = (port, ...more) => serve(
     'log', '--db', 'campaign.db', '--plan', 'plan.csv', '--duration', '2', '--source', 'virtual', '--live',
     String(port), ...more);
 
-export const startReader = () => serve('serve', '--db', 'campaign.db', '--port', '0');
+export const startReader = (port, ...more) =>
+    serve('serve', '--db', 'campaign.db', '--port', String(port), ...more);
