@@ -131,10 +131,10 @@ const expected = {
 
 function showButtons() {
   for (const {name, button, why} of actions) {
-    setClass(button, 'main', expected[controls.state.phase] === name);
     const readOnly =
         controls.writable ? '' : 'The page shows a file, read-only: nothing can be recorded from here.';
     refuse(button, !link.connected ? 'There is no connection to the server.' : readOnly || why());
+    setClass(button, 'main', !button.refuse && expected[controls.state.phase] === name);
   }
 }
 

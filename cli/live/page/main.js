@@ -21,7 +21,9 @@ function showHead({campaign, program, mode, source, simulated, writable}) {
   byId('facts').replaceChildren(
       ...(simulated ? [badge('note', 'simulated: no rig is behind this'), ' '] : []),
       ...(writable ? [] : [badge('note', 'read-only'), ' ']),
-      [program, mode === 'file' ? 'campaign file' : `source ${source}`].filter(Boolean).join(', '));
+      // the whole version, with its commit, is behind the short one
+      h('span', {title: program}, program.replace(/\+.*/, '')),
+      mode === 'file' ? ', campaign file' : `, source ${source}`);
   const needsRig = ['alarms', 'sound', 'run', 'measurement', 'signal', 'metadata'];
   for (const id of needsRig) byId(id).hidden = mode === 'file';
   setClass(byId('metadata').parentElement, 'alone', mode === 'file');

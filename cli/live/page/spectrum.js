@@ -120,7 +120,9 @@ function startSpectrum() {
   });
   const legend = h('p', {class: 'legend'});
   const lines = h('ul', {class: 'lines', 'aria-label': 'Lines of the rotor and the mains'});
-  const none = h('p', {class: 'soft'}, 'There is a spectrum once the frames of a second or two have come without a gap.');
+  const none =
+      h('p', {class: 'soft'},
+        'There is a spectrum once the frames of a second or two have come without a gap.');
   byId('spectrum').append(none, legend, spectrum.place, lines);
   startWaterfall();
   on('hello', ({rotors}) => {
