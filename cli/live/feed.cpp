@@ -161,7 +161,9 @@ void LiveFeed::tick(Time time) {
     next_spectrum_ = time + kSpectrum;
     send_spectrum(scale);
   }
-  if (time < next_state_) return;
+  const std::pair standing(now.position.phase, now.position.run.run);
+  if (time < next_state_ && standing == told_) return;
+  told_ = standing;
   next_state_ = time + (watched ? kState : kUnwatched);
   check(now, scale, time);
   viewers_.tell("state", state_json(now, scale));

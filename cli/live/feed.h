@@ -22,6 +22,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace tunnelrig::live {
@@ -103,6 +104,7 @@ class LiveFeed {
   void send_spectrum(const Scale& scale);
   void check(const Shared& now, const Scale& scale, Time time);
   void check_channels(const Shared& now, const Scale& scale, Time time);
+  static std::optional<double> tare_age_s(const Shared& now);
   std::string state_json(const Shared& now, const Scale& scale) const;
 
   CampaignInfo info_;
@@ -123,6 +125,7 @@ class LiveFeed {
   std::optional<double> shaft_hz_;
   double disk_free_B_ = 0;
   Time next_state_{}, next_spectrum_{}, next_disk_{};
+  std::pair<Phase, std::string> told_{Phase::kIdle, ""};  // phase and run of the last state
   std::thread thread_;
 };
 

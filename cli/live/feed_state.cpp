@@ -49,11 +49,7 @@ std::string LiveFeed::state_json(const Shared& now, const Scale& scale) const {
   const auto& clock = progress.clock;
   json["board_clock_ppm"] = clock ? Json(1e6 * (clock->rate_hz / nominal_hz - 1)) : Json(nullptr);
   json["board_clock_ppm_interval"] = clock ? Json(1e6 * clock->rate_interval_hz / nominal_hz) : Json(nullptr);
-  const auto tared = now.tare_ended.find(position.run.session);
-  json["tare_age_s"] =
-      tared == now.tare_ended.end()
-          ? Json(nullptr)
-          : Json(std::chrono::duration<double>(std::chrono::steady_clock::now() - tared->second).count());
+  json["tare_age_s"] = or_null(tare_age_s(now));
   RunningMeans means;
   if (view_ && view_->run.run == position.run.run)
     means = means_(view_->blocks, scale, info_, view_->run.air_temperature_C);
@@ -74,6 +70,17 @@ std::string LiveFeed::state_json(const Shared& now, const Scale& scale) const {
   json["viewers"] = viewers_.count();
   json["display_frames_dropped"] = ring_.dropped() + viewers_.dropped();
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// Since the session's last tare: by this process's clock, or by the file's where it was recorded earlier.
+std::optional<double> LiveFeed::tare_age_s(const Shared& now) {
+  const std::string& session = now.position.run.session;
+  if (const auto here = now.tare_ended.find(session); here != now.tare_ended.end())
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - here->second).count();
+  const auto stored = now.cells->tares.find(session);
+  if (stored == now.cells->tares.end() || stored->second.simulated) return {};
+  const auto utc = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(utc).count() - stored->second.end_s;
 }
 
 /// Alarms of the whole rig.

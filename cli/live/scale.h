@@ -14,9 +14,10 @@ namespace tunnelrig::live {
 struct CellKnowledge {
   struct Tare {
     std::array<double, kMaxRotors> mean_V{};
-    double end_s = 0;     // seconds since 1970, by the clock of the run's start
-    double drift_V = 0;   // largest change of a channel against the session's tare before
-    int drift_rotor = 0;  // 0: there was none before
+    bool simulated = false;  // by a rig with a calendar of its own
+    double end_s = 0;        // seconds since 1970, by the clock of the run's start
+    double drift_V = 0;      // largest change of a channel against the session's tare before
+    int drift_rotor = 0;     // 0: there was none before
   };
   /// A calibrated cell: thrust = (voltage − zero) · newtons_per_V, over the factor of its propeller already.
   struct Cell {

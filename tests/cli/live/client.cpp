@@ -48,7 +48,7 @@ bool receive(int socket, std::string& text, std::chrono::milliseconds patience) 
 
 }  // namespace
 
-HttpReply exchange(int port, const std::string& request) {
+HttpReply ask(int port, const std::string& request) {
   const int socket = connect_to(port);
   send_all(socket, request);
   std::string text;
@@ -61,14 +61,14 @@ HttpReply exchange(int port, const std::string& request) {
 }
 
 HttpReply get(int port, const std::string& target) {
-  return exchange(port, fmt::format("GET {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", target, port));
+  return ask(port, fmt::format("GET {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", target, port));
 }
 
 HttpReply post(int port, const std::string& json) {
-  return exchange(
-      port, fmt::format("POST /command HTTP/1.1\r\nHost: 127.0.0.1:{0}\r\nOrigin: http://127.0.0.1:{0}\r\n"
-                        "Content-Type: application/json\r\nContent-Length: {1}\r\n\r\n{2}",
-                        port, json.size(), json));
+  return ask(port,
+             fmt::format("POST /command HTTP/1.1\r\nHost: 127.0.0.1:{0}\r\nOrigin: http://127.0.0.1:{0}\r\n"
+                         "Content-Type: application/json\r\nContent-Length: {1}\r\n\r\n{2}",
+                         port, json.size(), json));
 }
 
 EventStream::EventStream(int port, const std::string& target) : socket_(connect_to(port)) {

@@ -14,7 +14,7 @@ struct HttpReply {
 };
 
 /// Sends `request` as it stands and reads until the server closes. Status 0 where nothing came.
-HttpReply exchange(int port, const std::string& request);
+HttpReply ask(int port, const std::string& request);
 
 /// GET or POST with the headers that a browser on the same computer sends.
 HttpReply get(int port, const std::string& target);

@@ -161,7 +161,8 @@ TEST_F(Watched, ChannelsThatAreWrongAlarm) {
       stream.next("alarms", [](const std::string& alarms) { return alarms.find("overload") != alarms.npos; });
   ASSERT_TRUE(text);
   std::set<std::pair<std::string, int>> active;
-  for (const json& alarm : json::parse(*text)["active"])
+  const json alarms_then = json::parse(*text);
+  for (const json& alarm : alarms_then["active"])
     active.emplace(alarm["kind"], alarm["rotor"].is_null() ? 0 : alarm["rotor"].get<int>());
   EXPECT_THAT(active, testing::IsSupersetOf({std::pair<std::string, int>("stuck", 2),
                                              {"clipping", 3},
@@ -175,7 +176,7 @@ TEST_F(Watched, RequestsAreAnsweredAndRefusedOverTheSocket) {
   EXPECT_EQ(test::get(port(), "/").body, "the page");
   EXPECT_EQ(test::get(port(), "/../../etc/passwd").status, 404);
   EXPECT_EQ(test::get(port(), "/%2e%2e/%2e%2e/etc/passwd").status, 404);
-  EXPECT_EQ(test::exchange(port(), "GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n").status, 403);
+  EXPECT_EQ(test::ask(port(), "GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n").status, 403);
   const test::HttpReply done =
       test::post(port(), std::string(R"({"command":"stop","token":")") + kToken + "\"}");
   EXPECT_EQ(done.status, 200);
@@ -184,23 +185,21 @@ TEST_F(Watched, RequestsAreAnsweredAndRefusedOverTheSocket) {
   EXPECT_EQ(test::post(port(), std::string(Site::kLongestBody + 1, ' ')).status, 413);
   const std::string host = "Host: 127.0.0.1:" + std::to_string(port()) + "\r\n";
   EXPECT_EQ(
-      test::exchange(
+      test::ask(
           port(),
           "POST /command HTTP/1.1\r\n" + host +
               "Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n5\r\n{}   \r\n0\r\n\r\n")
           .status,
       411);
-  EXPECT_EQ(test::exchange(port(), "PUT / HTTP/1.1\r\n" + host + "Content-Length: 0\r\n\r\n").status, 405);
+  EXPECT_EQ(test::ask(port(), "PUT / HTTP/1.1\r\n" + host + "Content-Length: 0\r\n\r\n").status, 405);
   EXPECT_EQ(
-      test::exchange(port(), "GET /" + std::string(20000, 'x') + " HTTP/1.1\r\n" + host + "\r\n").status /
-          100,
-      4);
+      test::ask(port(), "GET /" + std::string(20000, 'x') + " HTTP/1.1\r\n" + host + "\r\n").status / 100, 4);
   // what follows a refused request on the same connection is not taken for another one
   const std::string smuggled =
       "POST /events HTTP/1.1\r\n" + host + "Content-Length: 70\r\n\r\nGET / HTTP/1.1\r\n" + host + "\r\n";
-  EXPECT_THAT(test::exchange(port(), smuggled).body, testing::Not(HasSubstr("the page")));
+  EXPECT_THAT(test::ask(port(), smuggled).body, testing::Not(HasSubstr("the page")));
   for (const char* garbage : {"", "\r\n\r\n", "GET\r\n\r\n", "\x16\x03\x01", "GET / HTTP/9.9\r\n\r\n"})
-    test::exchange(port(), std::string(garbage) + "\r\n\r\n");
+    test::ask(port(), std::string(garbage) + "\r\n\r\n");
   EXPECT_EQ(test::get(port(), "/").status, 200) << "and goes on";
 }
 
