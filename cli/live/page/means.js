@@ -91,6 +91,9 @@ function startMeans() {
         prose(
             'U95 is that of the run\'s mean, as its frames scatter and hang together. What the ' +
             'calibration, other runs and other sessions add is in the report.')));
+  on('hello', ({rotors}) => {  // U compares the right pair with the left one
+    verdicts.find(({name}) => name === 'u_percent').parts.element.hidden = rotors !== 4;
+  });
   on('state', (state) => {
     for (const {name, what, parts} of verdicts) showVerdict(parts, what, state, state[name]);
     show(state.target);

@@ -133,13 +133,18 @@ step('a run is excluded with a reason, stays, and is included again', async () =
   await stands(page(), 'H4V0', /2 of 2 runs/);
 });
 
+step('a run is recorded anew, and the old one left out', async () => {
+  await page().getByRole('button', {name: 'Redo R0002'}).click();
+  await page().getByRole('button', {name: 'Record anew'}).click();
+  await reads(page(), '#runs', /R0002[^]*excluded redone as R0017/);
+  await stands(page(), 'H2V0', /done, 2 of 2 runs/);
+});
+
 step('a tare is asked for once more, recorded, and its age told', async () => {
   assert.match(await health(page(), 'Last tare'), /none|ago/);
   await page().keyboard.press('t');
   await page().getByRole('button', {name: 'Record tare'}).click();
-  await until(page(), 'the tare', ({phase}) => phase === 'recording');
-  await reads(page(), '#run', /Recording R0017: tare at/);
-  await until(page(), 'its end', ({phase, runs}) => phase === 'waiting' && runs === 17);
+  await reads(page(), '#runs', /R0018\s+OT\s+S1\s+tare/);
   await reads(page(), 'dl.health', /Last tare\s+\d\.\d s ago/);
 });
 
@@ -147,7 +152,7 @@ step('the page looks right and axe-core finds nothing, in four views', () => ins
 
 step('the server is killed in the middle of a run; the page says since when, and recovers', async () => {
   await page().keyboard.press('n');
-  await until(page(), 'a run', ({phase, run}) => phase === 'recording' && run === 'R0018');
+  await until(page(), 'a run', ({phase, run}) => phase === 'recording' && run === 'R0019');
   await set.logger.kill('SIGKILL');
   await reads(page(), '#connection', /Disconnected since \d\d:\d\d:\d\d/);
   await page().keyboard.press('x');
@@ -155,15 +160,17 @@ step('the server is killed in the middle of a run; the page says since when, and
   await inspect(page(), 'disconnected', [{width: 1280, scheme: 'light'}]);
   set.logger = await startLogger(set.port, '--faults', 'drop=0.05');
   await until(page(), 'the connection', ({connected, phase}) => connected && phase === 'waiting');
-  await reads(page(), '#runs', /R0018[^]*partial/);
+  await reads(page(), '#runs', /R0019[^]*partial/);
 });
 
 step('after that the commands hold again, and losses are seen and heard', async () => {
   await page().keyboard.press('n');
-  await until(page(), 'a run', ({phase, run}) => phase === 'recording' && run === 'R0019');
+  await until(page(), 'a run', ({phase, run}) => phase === 'recording' && run === 'R0020');
   await until(page(), 'an alarm, and a beep', ({alarms, beeps}) => alarms > 0 && beeps > 0);
   await reads(page(), '#alarms', /frames lost/);
   assert.match(await page().title(), /^⚠/);
+  await page().getByRole('button', {name: 'Sound is on'}).click();
+  await reads(page(), '#sound', /Sound is off/);
   await inspect(page(), 'recording', [{width: 1280, scheme: 'light'}, {width: 400, scheme: 'dark'}]);
   await page().getByRole('button', {name: /^Stop/}).click();
   await until(page(), 'the end', ({phase}) => phase !== 'recording');
@@ -182,7 +189,7 @@ step('nothing was complained of and nothing asked of others', async () => {
 step('the page over a file shows it and cannot change it', async () => {
   const reader = await startReader(0);
   const {page: read, complaints} = await open(set.browser, reader.address);
-  await until(read, 'the campaign', ({runs, maps}) => runs === 19 && maps === 2);
+  await until(read, 'the campaign', ({runs, maps}) => runs === 20 && maps === 2);
   assert.match(await text(read, '#facts'), /read-only/);
   assert.equal(await read.locator('#buttons').isVisible(), false);
   assert.equal(await read.getByRole('button', {name: /Exclude/}).count(), 0);
@@ -199,7 +206,7 @@ step('from elsewhere the address holds a token; a restart changes it, and the pa
   const given = new URL(reader.address);
   given.hostname = '127.0.0.1';  // this computer's name may lead nowhere here
   const {page: far} = await open(set.browser, given.href);
-  await until(far, 'the campaign', ({connected, runs}) => connected && runs === 19);
+  await until(far, 'the campaign', ({connected, runs}) => connected && runs === 20);
   assert.equal((await fetch(given.origin)).status, 403);
   await reader.kill('SIGKILL');
   reader = await startReader(Number(given.port), '--listen', '0.0.0.0');
