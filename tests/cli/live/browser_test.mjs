@@ -144,7 +144,7 @@ step('a tare is asked for once more, recorded, and its age told', async () => {
   assert.match(await health(page(), 'Last tare'), /none|ago/);
   await page().keyboard.press('t');
   await page().getByRole('button', {name: 'Record tare'}).click();
-  await reads(page(), '#runs', /R0018\s+OT\s+S1\s+tare/);
+  await reads(page(), '#runs', /R0018\s+\S+\s+S1\s+tare/);
   await reads(page(), 'dl.health', /Last tare\s+\d\.\d s ago/);
 });
 
