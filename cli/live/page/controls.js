@@ -12,6 +12,8 @@ function runText({phase, run, location, next_location: next, session, repeat, ki
   const name = phases[phase] ?? phase;
   const details = [session && `session ${session}`, kind !== 'tare' && known(repeat) && `repeat ${repeat}`];
   const where = `${kind === 'tare' ? 'tare at ' : ''}${location} (${details.filter(Boolean).join(', ')})`;
+  if (phase === 'recording' && !controls.writable)
+    return `Another process records ${run}: ${where}; its traces are on its own page`;
   if (phase === 'recording') return `${name} ${run}: ${where}`;
   if (phase === 'waiting') return `${name}: bring the rig to ${next ?? 'the next location'}, then press Next`;
   return run ? `${name}; the last run was ${run}: ${where}` : `${name}; no run yet`;
@@ -162,7 +164,7 @@ function startControls() {
     const recording = state.phase === 'recording';
     setText(text, runText(state) + (state.silent ? ' — SILENT: no frames come' : ''));
     setClass(byId('run'), 'recording', recording);
-    progress.hidden = !recording;
+    progress.hidden = !recording || !controls.writable;
     bar.style.width = `${fixed(Math.min(100, (100 * state.elapsed_s) / state.duration_s || 0), 1)}%`;
     setText(time, `${fixed(state.elapsed_s, 1)} of ${fixed(state.duration_s, 0)} s`);
     account.phase = state.phase;

@@ -29,7 +29,10 @@ const healthRows = [
   {label: 'Disk left', value: ({disk_free_B}) => bytes(disk_free_B)},
   {
     label: 'Last tare',
-    value: ({tare_age_s}) => (known(tare_age_s) ? `${duration(tare_age_s)} ago` : 'none in this session'),
+    value: ({tare_age_s}, mode) =>
+        (known(tare_age_s) ? `${duration(tare_age_s)} ago` :
+             mode === 'file' ? '–' :
+                               'none in this session'),
   },
   {
     label: 'Pages open',
@@ -49,10 +52,12 @@ function startHealth() {
       list,
       h('p', {class: 'soft'},
         'Display frames are dropped before anything else; what is stored does not depend on pages.'));
+  let mode = 'log';
+  on('hello', (hello) => (mode = hello.mode));
   on('state', (state) => {
     healthRows.forEach(({value, bad}, i) => {
       const wrong = Boolean(bad?.(state));
-      setText(cells[i], (wrong ? '⚠ ' : '') + value(state));
+      setText(cells[i], (wrong ? '⚠ ' : '') + value(state, mode));
       setClass(cells[i], 'bad', wrong);
     });
   });

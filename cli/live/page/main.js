@@ -24,9 +24,9 @@ function showHead({campaign, program, mode, source, simulated, writable}) {
       // the whole version, with its commit, is behind the short one
       h('span', {title: program}, program.replace(/\+.*/, '')),
       mode === 'file' ? ', campaign file' : `, source ${source}`);
-  const needsRig = ['alarms', 'sound', 'run', 'measurement', 'signal', 'metadata'];
-  for (const id of needsRig) byId(id).hidden = mode === 'file';
-  setClass(byId('metadata').parentElement, 'alone', mode === 'file');
+  const file = mode === 'file';
+  for (const id of ['alarms', 'sound', 'measurement', 'spectrum', 'metadata']) byId(id).hidden = file;
+  for (const id of ['signal', 'records']) setClass(byId(id), 'alone', file);
 }
 
 /** The window's title tells the run and alarms while the page stands behind others. */

@@ -193,6 +193,7 @@ step('the page over a file shows it and cannot change it', async () => {
   assert.match(await text(read, '#facts'), /read-only/);
   assert.equal(await read.locator('#buttons').isVisible(), false);
   assert.equal(await read.getByRole('button', {name: /Exclude/}).count(), 0);
+  await reads(read, '#run', /last run was R0020: H4V-2/);
   await inspect(read, 'file', [{width: 1280, scheme: 'dark'}]);
   assert.deepEqual(complaints, []);
   const old =
