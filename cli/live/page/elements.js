@@ -33,14 +33,6 @@ function setClass(element, name, wanted) {
   if (element.classList.contains(name) !== wanted) element.classList.toggle(name, wanted);
 }
 
-/** An element of a drawing. */
-function svg(tag, attributes = {}, ...children) {
-  const element = document.createElementNS('http://www.w3.org/2000/svg', tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  element.append(...children);
-  return element;
-}
-
 let forget;
 
 /** What came of a command or a key, at the window's foot for a while. */
@@ -127,18 +119,6 @@ function bytes(value) {
 }
 
 const clock = (date) => date.toTimeString().slice(0, 8);
-
-/** Fits a canvas to its place on the screen; its context, scaled to CSS pixels. */
-function fitted(canvas, width, height) {
-  const ratio = devicePixelRatio || 1;
-  canvas.width = Math.round(width * ratio);
-  canvas.height = Math.round(height * ratio);
-  canvas.style.width = `${width}px`;
-  canvas.style.height = `${height}px`;
-  const context = canvas.getContext('2d');
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  return context;
-}
 
 const redraws = [];
 
