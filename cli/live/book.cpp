@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
+
+#include <nlohmann/json.hpp>
 
 namespace tunnelrig::live {
 namespace {
@@ -22,6 +25,15 @@ std::string fingerprint(const Reduction& reduction) {
   for (const RunCoefficients& run : reduction.runs)
     sum += static_cast<double>(run.run + 1) * run.c_t + run.u_percent;
   return fmt::format("{} {:.17g} {}", reduction.runs.size(), sum, reduction.model_name());
+}
+
+std::string unreadable_json(const std::string& reason) {
+  using Json = nlohmann::ordered_json;
+  const Json json{{"locations", Json::array()},
+                  {"runs", Json::array()},
+                  {"maps", nullptr},
+                  {"maps_reason", "the campaign cannot be read: " + reason}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace
@@ -82,21 +94,25 @@ void Book::look() {
 
 void Book::work() {
   lower_priority(15);
-  CampaignFile file(settings_.campaign, CampaignFile::Access::kRead);
+  std::optional<CampaignFile> file;
   Clock::duration pause = kLook;
+  bool failed = false;
   while (true) {
     {
       std::unique_lock lock(mutex_);
       wake_.wait_for(lock, pause, [&] { return asked_ || stopping_; });
       if (stopping_) return;
-      if (!asked_ && !changed(file)) continue;
+      if (!asked_ && !failed && !changed(*file)) continue;
       asked_ = false;
     }
     const auto begin = Clock::now();
     try {
-      read(file);
-    } catch (const std::exception& error) {  // of a file that another program is changing
-      maps_reason_ = error.what();
+      if (!file) file.emplace(settings_.campaign, CampaignFile::Access::kRead);
+      read(*file);
+      failed = false;
+    } catch (const std::exception& error) {  // of a file that another program is changing, or has broken
+      viewers_.tell("campaign", unreadable_json(error.what()));
+      failed = true;  // and tries again
     }
     pause = std::max<Clock::duration>(kLook, kShare * (Clock::now() - begin));
   }

@@ -84,11 +84,12 @@ std::map<std::string, std::optional<double>> metadata_values(const Object& objec
   if (found == object.end() || !found->is_object())
     throw InputError("metadata: values is an object of numbers");
   std::map<std::string, std::optional<double>> values;
-  for (const auto& [name, value] : found->items()) {
+  for (const auto& item : found->items()) {
+    const std::string& name = item.key();
+    const Object& value = item.value();
     const auto* field =
         std::find_if(kMetadata.begin(), kMetadata.end(), [&](const auto& f) { return name == f.name; });
-    if (field == kMetadata.end())
-      throw InputError(fmt::format("metadata: there is no quantity of this name"));
+    if (field == kMetadata.end()) throw InputError("metadata: there is no quantity of this name");
     if (value.is_null())
       values[name] = std::nullopt;
     else

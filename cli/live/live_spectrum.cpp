@@ -11,7 +11,7 @@
 namespace tunnelrig::live {
 namespace {
 
-constexpr int kBladeHarmonics = 3;
+constexpr int kBladeHarmonics = 5;  // the last are aliases at the usual rate
 constexpr int kMainsHarmonics = 3;
 
 MarkedLine marked(const std::string& name, double frequency_hz, double rate_hz) {

@@ -11,7 +11,7 @@ Scale scale_of(const CellKnowledge& knowledge, const CampaignInfo& info, const s
       scale.slope[i] = volts;
       continue;
     }
-    const CellKnowledge::Cell& cell = (*knowledge.cells)[i];
+    const CalibratedCell& cell = (*knowledge.cells)[i];
     const double zero_V = tare == knowledge.tares.end() ? cell.zero_V : tare->second.mean_V[i];
     scale.slope[i] = cell.newtons_per_V * volts;
     scale.offset[i] = -cell.newtons_per_V * zero_V;

@@ -10,6 +10,12 @@
 
 namespace tunnelrig::live {
 
+/// A calibrated cell: thrust = (voltage − zero) · newtons_per_V, over the factor of its propeller already.
+struct CalibratedCell {
+  double newtons_per_V = 0;
+  double zero_V = 0;  // the certificate's, where the session has no tare
+};
+
 /// What a campaign file knows of its cells; read by one thread, handed to others whole.
 struct CellKnowledge {
   struct Tare {
@@ -19,12 +25,7 @@ struct CellKnowledge {
     double drift_V = 0;      // largest change of a channel against the session's tare before
     int drift_rotor = 0;     // 0: there was none before
   };
-  /// A calibrated cell: thrust = (voltage − zero) · newtons_per_V, over the factor of its propeller already.
-  struct Cell {
-    double newtons_per_V = 0;
-    double zero_V = 0;  // the certificate's, where the session has no tare
-  };
-  std::optional<std::array<Cell, kMaxRotors>> cells;
+  std::optional<std::array<CalibratedCell, kMaxRotors>> cells;
   std::map<std::string, Tare> tares;  // the last complete one of each session
 };
 

@@ -4,6 +4,7 @@
 #include "cli/live/client.h"
 #include "datasets/campaign_file.h"
 #include "datasets/raw_store.h"
+#include "datasets/run_marks.h"
 #include "datasets/sqlite.h"
 #include "support/temporary_folder.h"
 
@@ -242,6 +243,10 @@ TEST_F(LivePage, WalksAPlanAndShowsTheMaps) {
   EXPECT_EQ(refused.status, 409);
   EXPECT_THAT(refused.body, HasSubstr("only reads"));
   EXPECT_EQ(serve.stop(), 0);
+
+  CampaignFile edited(folder / "c.db", CampaignFile::Access::kWrite);
+  exclude_run(edited, "R0003", "a draught");
+  EXPECT_THAT(run("map --db c.db --out maps").error, HasSubstr("run R0003 is left out: excluded: a draught"));
 }
 
 TEST_F(LivePage, ServeFollowsWhoRecords) {
@@ -326,7 +331,6 @@ TEST_F(LivePage, TenThousandRuns) {
   RecordProperty("milliseconds", static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(
                                                       std::chrono::steady_clock::now() - begin)
                                                       .count()));
-  std::printf("%zu bytes\n", campaign->size());
 }
 
 }  // namespace
