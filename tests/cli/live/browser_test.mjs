@@ -98,7 +98,8 @@ step('means grow certain against the target; the spectrum names its lines', asyn
     await reads(page(), '.verdict', verdict);
   }
   await reads(page(), '#spectrum', /shaft: \d+\.\d Hz/);
-  await reads(page(), '#spectrum', /mains/);
+  await reads(page(), '#spectrum', /blade pass ×5: 8\d\d\.\d Hz, seen at \d+\.\d Hz \(alias, dashed\)/);
+  await reads(page(), '#spectrum', /mains: 50.0 Hz/);
   assert.ok((await picture(page(), '#spectrum canvas.waterfall')).colours > 5, 'the waterfall is empty');
   assert.ok(Number((await health(page(), 'Frames stored')).replaceAll(',', '')) > 1000);
 });
