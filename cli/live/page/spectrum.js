@@ -122,7 +122,7 @@ function startSpectrum() {
   const lines = h('ul', {class: 'lines', 'aria-label': 'Lines of the rotor and the mains'});
   const none =
       h('p', {class: 'soft'},
-        'There is a spectrum once the frames of a second or two have come without a gap.');
+        'There is a spectrum once the frames of three seconds have come without a long gap.');
   byId('spectrum').append(none, legend, spectrum.place, lines);
   startWaterfall();
   on('hello', ({rotors}) => {
