@@ -95,6 +95,21 @@ class Examination {
       good("recordings", "every run is complete");
   }
 
+  void marks() {
+    Names excluded, alarmed;
+    for (const Run& run : data_.runs) {
+      if (!run.excluded.empty())
+        excluded.add(fmt::format("{} ({})", run.run, run.excluded));
+      else if (!run.alarms.empty())
+        alarmed.add(fmt::format("{} ({})", run.run, run.alarms));
+    }
+    if (!excluded.empty())
+      note("exclusions", "kept, and left out of what is derived: " + excluded.text(),
+           "`tunnelrig serve` shows their notes; the live page of `log` takes them in again");
+    if (!alarmed.empty())
+      note("alarms", "while recording: " + alarmed.text(), "look at these runs; redo or exclude them");
+  }
+
   void ledgers() {
     Names open, lossy, much;
     std::uint64_t lost = 0, emitted = 0;
@@ -325,6 +340,7 @@ std::vector<Finding> examine(const CampaignFile& file, const CampaignData& data,
   examination.integrity();
   examination.raw_data(progress);
   examination.states();
+  examination.marks();
   examination.ledgers();
   examination.calibration();
   examination.tares();

@@ -81,7 +81,9 @@ Tares tares_of(const CampaignData& data) {
   for (const Run& run : data.runs) {
     const auto statistics = data.statistics.find(run.run);
     const auto raw = data.raw.find(run.run);
-    if (run.kind != RunKind::kTare || statistics == data.statistics.end() || raw == data.raw.end()) continue;
+    if (run.kind != RunKind::kTare || !run.excluded.empty() || statistics == data.statistics.end() ||
+        raw == data.raw.end())
+      continue;
     if (raw->second.state != RunState::kComplete) continue;
     const double half_s = 0.5 * static_cast<double>(raw->second.frames) / data.info.daq.sample_rate_hz;
     TareReading reading{.session = run.session, .time_s = run.start_s + half_s};
@@ -171,6 +173,10 @@ Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms) {
   reduction.tares = tares_of(data);
   for (std::size_t r = 0; r < data.runs.size(); ++r) {
     const Run& run = data.runs[r];
+    if (!run.excluded.empty()) {
+      reduction.left_out.push_back({run.run, fmt::format("excluded: {}", run.excluded), false});
+      continue;
+    }
     if (run.kind == RunKind::kTare) continue;
     RunCoefficients result;
     result.run = r;

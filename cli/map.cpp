@@ -68,6 +68,9 @@ int run_map(const MapOptions& options) {
           {program_version(), arguments(),
            nlohmann::json{{"calibration", data.certificate_id}, {"model", reduction.model.version}}.dump()},
           format_disturbance_map(written.map));
+  for (const LeftOutRun& run : reduction.left_out) {
+    if (run.reason.starts_with("excluded")) warn(fmt::format("run {} is left out: {}", run.run, run.reason));
+  }
   if (written.warning) warn(*written.warning);
   if (options.json) {
     nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},

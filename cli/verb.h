@@ -22,6 +22,7 @@ void add_report(CLI::App& app, Work& run);
 void add_explain(CLI::App& app, Work& run);
 void add_fly(CLI::App& app, Work& run);
 void add_models(CLI::App& app, Work& run);
+void add_serve(CLI::App& app, Work& run);
 void add_doctor(CLI::App& app, Work& run);
 void add_devices(CLI::App& app, Work& run);
 void add_demo(CLI::App& app, Work& run);

@@ -15,8 +15,9 @@ void declare_program(CLI::App& app, Work& work) {
   app.set_version_flag("--version", program_version());
   app.require_subcommand(1);
   app.get_formatter()->column_width(34);
-  for (const auto add : {add_demo, add_log, add_plan, add_import, add_export, add_calibrate, add_reduce,
-                         add_map, add_report, add_devices, add_doctor, add_explain, add_models, add_fly}) {
+  for (const auto add :
+       {add_demo, add_log, add_plan, add_import, add_export, add_calibrate, add_reduce, add_map, add_report,
+        add_serve, add_devices, add_doctor, add_explain, add_models, add_fly}) {
     add(app, work);
   }
 }

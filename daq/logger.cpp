@@ -68,11 +68,13 @@ class Reader {
 /// Hands frames to the store and to the summary, and keeps the running means.
 class RunSink : public FrameSink {
  public:
-  RunSink(RawWriter& writer, RunSummarizer& summarizer) : writer_(writer), summarizer_(summarizer) {}
+  RunSink(RawWriter& writer, RunSummarizer& summarizer, FrameSink* watcher)
+      : writer_(writer), summarizer_(summarizer), watcher_(watcher) {}
 
   void frames(std::span<const std::byte> data) override {
     writer_.frames(data);
     summarizer_.frames(data);
+    if (watcher_ != nullptr) watcher_->frames(data);
     std::array<std::int16_t, 4> frame{};
     for (std::size_t at = 0; at < data.size(); at += sizeof frame) {
       std::memcpy(frame.data(), data.data() + at, sizeof frame);
@@ -84,6 +86,7 @@ class RunSink : public FrameSink {
   void gap(const Gap& gap) override {
     writer_.gap(gap);
     summarizer_.gap(gap);
+    if (watcher_ != nullptr) watcher_->gap(gap);
   }
 
   std::array<double, 4> means() const {
@@ -97,6 +100,7 @@ class RunSink : public FrameSink {
  private:
   RawWriter& writer_;
   RunSummarizer& summarizer_;
+  FrameSink* watcher_;
   std::array<std::int64_t, 4> sums_{};
   std::uint64_t count_ = 0;
 };
@@ -157,15 +161,15 @@ class Watchdog {
 class Recording {
  public:
   Recording(CampaignFile& file, const std::string& run, const CampaignInfo& info, const LogSettings& settings,
-            RunSummarizer& summarizer, const std::string& source_name)
+            RunSummarizer& summarizer, const PacketSource& source)
       : settings_(settings),
         rate_hz_(info.daq.sample_rate_hz),
         tracker_(static_cast<std::uint64_t>(std::llround(settings.duration_s * rate_hz_))),
         writer_(file, run, RawFormat{}, static_cast<std::size_t>(kChunk_s * rate_hz_)),
-        sink_(writer_, summarizer),
+        sink_(writer_, summarizer, settings.watcher),
         packets_(tracker_, sink_),
         watchdog_(settings.silence_s, settings.give_up_s),
-        source_name_(source_name) {}
+        source_(source) {}
 
   /// Works until the run is complete or ends otherwise; returns the reason, empty where it is complete.
   std::string record(BlockQueue& queue, Reader& reader,
@@ -218,7 +222,9 @@ class Recording {
               .duration_s = settings_.duration_s,
               .silent = watchdog_.silent(),
               .mean_counts = sink_.means(),
-              .ledger = &now});
+              .ledger = &now,
+              .clock = packets_.clock().estimate(),
+              .ring_frames = source_.ring_frames()});
   }
 
  private:
@@ -252,7 +258,7 @@ class Recording {
     ledger.bytes_skipped = decoder_.bytes_skipped();
     ledger.silences = silences_;
     ledger.end_reason = end_reason_;
-    ledger.source = source_name_;
+    ledger.source = source_.name();
     return ledger;
   }
 
@@ -276,7 +282,7 @@ class Recording {
   RunSink sink_;
   TrackerSink packets_;
   Watchdog watchdog_;
-  std::string source_name_;
+  const PacketSource& source_;
   std::uint64_t silences_ = 0;
   std::string end_reason_;
   Clock::time_point oldest_pending_ = Clock::time_point::max();
@@ -299,7 +305,7 @@ LogOutcome log_run(PacketSource& source, CampaignFile& file, const RunCells& run
   std::optional<Recording> recording;
   file.atomically([&] {
     file.append_row("runs", run);
-    recording.emplace(file, name_of_run(run), info, settings, *summarizer, source.name());
+    recording.emplace(file, name_of_run(run), info, settings, *summarizer, source);
   });
   std::string end_reason;
   {

@@ -31,6 +31,9 @@ struct LogSettings {
 
   std::filesystem::path
       capture;  // the bytes as received go here too, for `--source replay:FILE`; empty: nowhere
+
+  /// Sees every frame and gap as it is recorded, on the recording thread: it must not wait (daq/live/).
+  FrameSink* watcher = nullptr;
 };
 
 struct LogProgress {
@@ -39,6 +42,8 @@ struct LogProgress {
   bool silent = false;
   std::array<double, 4> mean_counts{};  // of the frames so far
   const Ledger* ledger = nullptr;
+  std::optional<ClockEstimate> clock;        // so far, of a source with a clock
+  std::optional<std::uint64_t> ring_frames;  // the most that ever waited on the board, where it says so
 };
 
 struct LogOutcome {

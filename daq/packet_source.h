@@ -3,7 +3,9 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -39,7 +41,10 @@ class PacketSource {
   /// again.
   virtual bool reopen() = 0;
 
-  /// As the ledger names it: "tcp:localhost:4000".
+  /// The most frames that ever waited on the board, where the source knows. Any thread may ask.
+  virtual std::optional<std::uint64_t> ring_frames() const { return {}; }
+
+  /// As the ledger names it: "tcp:localhost:4000". Any thread may ask.
   virtual std::string name() const = 0;
 };
 

@@ -6,7 +6,9 @@
 #include "datasets/error.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace tunnelrig {
@@ -14,6 +16,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kQuiet{20};
 constexpr int kOpenTries = 3;
+constexpr double kStatistics_s = 5;
 
 class UsbSource : public PacketSource {
  public:
@@ -34,6 +37,12 @@ class UsbSource : public PacketSource {
 
   std::string name() const override { return name_; }
 
+  std::optional<std::uint64_t> ring_frames() const override {
+    const std::int64_t frames = ring_frames_;
+    if (frames < 0) return {};
+    return static_cast<std::uint64_t>(frames);
+  }
+
   /// What the board sampled while nobody recorded is no part of the run.
   void begin_run() override {
     rest_.clear();
@@ -48,6 +57,7 @@ class UsbSource : public PacketSource {
     const UsbStream::Got got = stream_->read(buffer, timeout);
     if (got.status == UsbStream::Status::kData) {
       silent_ = std::chrono::milliseconds(0);
+      if (got.time_s >= next_statistics_s_) ask_for_statistics(got.time_s);
       return {ReadResult::Status::kData, got.size, got.time_s, got.cause};
     }
     if (got.status == UsbStream::Status::kBroken) return broken(got.cause);
@@ -71,6 +81,13 @@ class UsbSource : public PacketSource {
     std::copy_n(rest_.begin(), size, buffer.begin());
     rest_.erase(rest_.begin(), rest_.begin() + static_cast<std::ptrdiff_t>(size));
     return {ReadResult::Status::kData, size, steady_seconds()};
+  }
+
+  /// The stream goes on meanwhile, into its queue. A board that does not answer is not asked again.
+  void ask_for_statistics(double time_s) {
+    const auto statistics = board_->statistics();
+    if (statistics) ring_frames_ = statistics->ring_peak;
+    next_statistics_s_ = time_s + (statistics ? kStatistics_s : std::numeric_limits<double>::infinity());
   }
 
   ReadResult broken(const char* cause) {
@@ -113,6 +130,7 @@ class UsbSource : public PacketSource {
         std::max(settings_.silence, std::chrono::milliseconds(std::llround(3e3 * std::max(frame_s, 0.012))));
     boot_id_ = board_->identity().boot_id;
     silent_ = std::chrono::milliseconds(0);
+    next_statistics_s_ = steady_seconds() + kStatistics_s;
     broken_ = false;
     return true;
   }
@@ -146,6 +164,8 @@ class UsbSource : public PacketSource {
   std::vector<std::byte> rest_;  // of streams that were closed
   std::uint32_t boot_id_ = 0;
   std::chrono::milliseconds silent_{0}, silence_limit_{0};
+  double next_statistics_s_ = 0;
+  std::atomic<std::int64_t> ring_frames_{-1};  // none yet
   bool broken_ = false;
 };
 

@@ -67,6 +67,7 @@ void VirtualBoard::step() {
     const double held_s = static_cast<double>(ring_.size() * kFramesPerPacket) / settings_.frame_rate_hz;
     lost_some_ = held_s >= kRing_s;
     if (!lost_some_) ring_.push_back(std::move(packet));
+    ring_peak_ = std::max<std::uint64_t>(ring_peak_, ring_.size() * kFramesPerPacket);
   }
   clock_frames_ += kFramesPerPacket;
   for (; link_open() && !ring_.empty(); ring_.pop_front()) send(std::move(ring_.front()));
@@ -152,7 +153,9 @@ ReadResult VirtualBoard::read(std::span<std::byte> buffer, std::chrono::millisec
     arrived_.clear();
     read_ = 0;
   }
-  const double time_s = settings_.pace > 0 ? steady_seconds() : board_time_s();
+  // By the rig's own time, so that a clock that is held against it runs right at any pace.
+  const double time_s =
+      settings_.pace > 0 ? (steady_seconds() - started_s_) * settings_.pace : board_time_s();
   return {size > 0 ? ReadResult::Status::kData : ReadResult::Status::kNothing, size, time_s};
 }
 

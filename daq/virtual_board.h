@@ -5,6 +5,7 @@
 #include "daq/packet_source.h"
 #include "tunnelrig_wire.h"
 
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -30,6 +31,7 @@ class VirtualBoard : public PacketSource {
 
   ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds timeout) override;
   bool reopen() override { return true; }
+  std::optional<std::uint64_t> ring_frames() const override { return ring_peak_.load(); }
   std::string name() const override { return "virtual"; }
 
   /// Frames sampled so far, whatever became of them; while the board reboots it samples none.
@@ -57,6 +59,7 @@ class VirtualBoard : public PacketSource {
   bool down_ = false;                        // rebooting
   bool lost_some_ = false;                   // the ring was full: the next frame that is kept says so
   std::deque<std::vector<std::byte>> ring_;  // packets on the board
+  std::atomic<std::uint64_t> ring_peak_{0};  // frames
   std::vector<std::byte> kept_back_;         // a packet that will be sent behind the next one
   std::vector<std::byte> arrived_;           // bytes on the host's side, not yet read
   std::size_t read_ = 0;

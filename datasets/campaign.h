@@ -27,6 +27,8 @@ struct Rig {
   double vehicle_height_m = 0;  // h_q
   double nominal_speed_rpm = 5000;
   double blade_chord_m = 0.025;
+  int blades = 2;              // of a propeller: the blade-pass line is so many times the shaft's
+  double cell_limit_N = 9.81;  // what a load cell may carry: 1 kg
 };
 
 struct Tunnel {
@@ -38,6 +40,7 @@ struct Daq {
   double sample_rate_hz = 4000.0 / 3.0;
   int adc_bits = 12;
   double adc_reference_V = 3.3;
+  double mains_hz = 50;
 
   /// volts = counts · adc_reference_V / 2^adc_bits
   double volts_per_count() const;
@@ -105,6 +108,9 @@ struct Run {
   RunKind kind = RunKind::kThrust;
   std::optional<double> y_norm, z_norm;  // −1 to 1, normalised tunnel coordinates (4.1, 4.2)
   std::array<std::optional<double>, kMaxRotors> thrust_N;
+  std::string excluded;  // why the run is left out of what is derived; empty: it is not
+  std::string note;      // remarks, one a line
+  std::string alarms;    // what was wrong while it was recorded: "clipping;loss"
   std::map<std::string, double, std::less<>> numbers;      // every numeric column that has a value
   std::map<std::string, std::string, std::less<>> labels;  // every text column that has a value
   std::size_t row = 0;                                     // in the sheet

@@ -5,6 +5,7 @@
 #include "datasets/schema.h"
 #include "datasets/sqlite.h"
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <system_error>
@@ -242,6 +243,71 @@ void CampaignFile::append_row(std::string_view name,
       .bind(nlohmann::json(row.rows[0].cells).dump())
       .run();
 }
+
+namespace {
+
+/// A row of a sheet, found by one of its cells.
+struct FoundRow {
+  std::vector<std::string> columns, cells;
+  std::int64_t row = 0;
+};
+
+std::vector<std::string> texts_of(const std::string& json) {
+  return nlohmann::json::parse(json).get<std::vector<std::string>>();
+}
+
+FoundRow find_row(const Database& database, std::string_view name, std::string_view key,
+                  std::string_view value) {
+  FoundRow found;
+  Statement columns(database, "SELECT columns FROM sheets WHERE sheet = ?");
+  columns.bind(name);
+  if (columns.step()) found.columns = texts_of(columns.text(0));
+  const auto at = std::find(found.columns.begin(), found.columns.end(), key);
+  if (at != found.columns.end()) {
+    Statement select(database,
+                     "SELECT row, cells FROM sheet_rows WHERE sheet = ? AND json_extract(cells, ?) = ?");
+    select.bind(name).bind(fmt::format("$[{}]", at - found.columns.begin())).bind(value);
+    if (select.step()) {
+      found.row = select.integer(0);
+      found.cells = texts_of(select.text(1));
+      found.cells.resize(found.columns.size());
+      return found;
+    }
+  }
+  throw InputError(fmt::format("there is no {} {}", key, value));
+}
+
+}  // namespace
+
+std::string CampaignFile::cell(std::string_view name, std::string_view key, std::string_view value,
+                               std::string_view column) const {
+  const FoundRow found = find_row(*database_, name, key, value);
+  const auto at = std::find(found.columns.begin(), found.columns.end(), column);
+  return at == found.columns.end() ? "" : found.cells[static_cast<std::size_t>(at - found.columns.begin())];
+}
+
+void CampaignFile::set_cell(std::string_view name, std::string_view key, std::string_view value,
+                            std::string_view column, std::string_view text) {
+  FoundRow found = find_row(*database_, name, key, value);
+  auto at = std::find(found.columns.begin(), found.columns.end(), column);
+  if (at == found.columns.end()) {
+    if (text.empty()) return;
+    at = found.columns.insert(found.columns.end(), std::string(column));
+    found.cells.emplace_back();
+    Statement(*database_, "UPDATE sheets SET columns = ? WHERE sheet = ?")
+        .bind(nlohmann::json(found.columns).dump())
+        .bind(name)
+        .run();
+  }
+  found.cells[static_cast<std::size_t>(at - found.columns.begin())] = text;
+  Statement(*database_, "UPDATE sheet_rows SET cells = ? WHERE sheet = ? AND row = ?")
+      .bind(nlohmann::json(found.cells).dump())
+      .bind(name)
+      .bind(found.row)
+      .run();
+}
+
+std::int64_t CampaignFile::data_version() const { return database_->scalar_integer("PRAGMA data_version"); }
 
 CampaignInfo CampaignFile::info() const {
   const auto toml = text("campaign.toml");

@@ -68,6 +68,18 @@ class CampaignFile {
   /// Appends a row, filling columns by name; columns that the sheet lacks are added to it.
   void append_row(std::string_view name, const std::vector<std::pair<std::string, std::string>>& cells);
 
+  /// One cell of the row whose `key` column reads `value`; empty where the sheet lacks `column`. Throws
+  /// InputError where there is no such row.
+  std::string cell(std::string_view name, std::string_view key, std::string_view value,
+                   std::string_view column) const;
+
+  /// Sets that cell; a column that the sheet lacks is added.
+  void set_cell(std::string_view name, std::string_view key, std::string_view value, std::string_view column,
+                std::string_view text);
+
+  /// Changes whenever another connection has written to the file.
+  std::int64_t data_version() const;
+
   CampaignInfo info() const;  // throws InputError where the file holds no campaign
   std::vector<Run> runs() const;
   std::vector<CalibrationPoint> calibration_points() const;

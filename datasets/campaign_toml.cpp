@@ -74,6 +74,8 @@ Rig parse_rig(const Section& section) {
   rig.arm_length_m = section.number("arm_length_m", 0, 50, "m").value_or(0);
   rig.vehicle_width_m = section.number("vehicle_width_m", 0, 100, "m").value_or(0);
   rig.vehicle_height_m = section.number("vehicle_height_m", 0, 100, "m").value_or(0);
+  rig.blades = static_cast<int>(std::lround(section.number("blades", 1, 16, "blades").value_or(rig.blades)));
+  rig.cell_limit_N = section.number("cell_limit_N", 0.001, 1e6, "N").value_or(rig.cell_limit_N);
   rig.blade_chord_m = section.number("blade_chord_m", 1e-4, 2, "m").value_or(0);
   return rig;
 }
@@ -84,6 +86,7 @@ Daq parse_daq(const Section& section) {
   daq.adc_bits =
       static_cast<int>(std::lround(section.number("adc_bits", 1, 16, "bits").value_or(daq.adc_bits)));
   daq.adc_reference_V = section.number("adc_reference_V", 0.01, 100, "V").value_or(daq.adc_reference_V);
+  daq.mains_hz = section.number("mains_hz", 1, 1000, "Hz").value_or(daq.mains_hz);
   return daq;
 }
 

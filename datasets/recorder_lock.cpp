@@ -4,7 +4,9 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <system_error>
+#include <thread>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -37,6 +39,23 @@ bool still_the_file(int fd, const std::string& file) {
          held.st_dev == named.st_dev;
 }
 
+/// The process id in the file, for messages; the lock holds without it (a full disk, say).
+std::string read_pid(int fd) {
+  std::array<char, 32> pid{};
+  const ssize_t length = ::pread(fd, pid.data(), pid.size() - 1, 0);
+  return length > 0 ? pid.data() : "unknown";
+}
+
+/// Who only looks (recorder_of) holds the lock for an instant: that is no recorder.
+bool try_lock(int fd) {
+  constexpr int kTries = 5;
+  for (int i = 0; i < kTries; ++i) {
+    if (::flock(fd, LOCK_EX | LOCK_NB) == 0) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return false;
+}
+
 }  // namespace
 
 std::shared_ptr<void> lock_for_recording(const std::filesystem::path& campaign) {
@@ -47,12 +66,11 @@ std::shared_ptr<void> lock_for_recording(const std::filesystem::path& campaign) 
       throw InputError::in(campaign.string(), "cannot be written: {}",
                            std::generic_category().message(errno));
     }
-    if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
-      std::array<char, 32> pid{};
-      const ssize_t length = ::read(fd, pid.data(), pid.size() - 1);
+    if (!try_lock(fd)) {
+      const std::string pid = read_pid(fd);
       ::close(fd);
       throw InputError::in(campaign.string(), "is being recorded to by process {}; one recorder per file",
-                           length > 0 ? pid.data() : "unknown");
+                           pid);
     }
     if (!still_the_file(fd, file)) {
       ::close(fd);
@@ -64,6 +82,15 @@ std::shared_ptr<void> lock_for_recording(const std::filesystem::path& campaign) 
     }
     return std::make_shared<Lock>(fd, file);
   }
+}
+
+std::optional<std::string> recorder_of(const std::filesystem::path& campaign) {
+  const int fd = ::open((campaign.string() + ".lock").c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return {};
+  std::optional<std::string> pid;
+  if (::flock(fd, LOCK_SH | LOCK_NB) != 0) pid = read_pid(fd);
+  ::close(fd);
+  return pid;
 }
 
 }  // namespace tunnelrig

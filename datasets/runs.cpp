@@ -59,8 +59,8 @@ constexpr std::array<UnitTwin, 14> kTwins = {{{"air_temperature_C", "air_tempera
                                               {"supply_voltage_V", "supply_voltage"},
                                               {"cell_temperature_C", "cell_temperature_K"}}};
 
-constexpr std::array<std::string_view, 7> kText = {"run", "location", "session", "start_utc",
-                                                   "raw", "kind",     "repeat"};
+constexpr std::array<std::string_view, 10> kText = {"run",  "location", "session",  "start_utc", "raw",
+                                                    "kind", "repeat",   "excluded", "note",      "alarms"};
 
 bool is_text_column(std::string_view name) {
   return std::find(kText.begin(), kText.end(), name) != kText.end();
@@ -162,6 +162,9 @@ Run parse_run(const Sheet& sheet, std::size_t row, const Columns& columns, const
   }
   sheet.require("raw");
   run.raw = sheet.text(row, "raw");
+  run.excluded = sheet.text(row, "excluded");
+  run.note = sheet.text(row, "note");
+  run.alarms = sheet.text(row, "alarms");
   for (const std::size_t i : columns.numbers) {
     const std::string& name = sheet.columns[i];
     if (const auto value = sheet.number(row, name)) {

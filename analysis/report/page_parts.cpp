@@ -1,17 +1,8 @@
 #include "analysis/report/page_parts.h"
 
-#include <cstdint>
+#include "cmake/embed.h"
 
-// The assembler takes the files in: a compiler would need minutes and gigabytes for Plotly as an array.
 // TUNNELRIG_…_FILE are paths, which CMakeLists.txt defines.
-#define TUNNELRIG_EMBED(name, file)                                                                         \
-  asm(".pushsection .rodata\n"                                                                              \
-      ".balign 8\n" #name "_size: .quad " #name "_end - " #name "\n" #name ": .incbin \"" file "\"\n" #name \
-      "_end:\n"                                                                                             \
-      ".popsection\n");                                                                                     \
-  extern "C" const std::uint64_t name##_size;                                                               \
-  extern "C" const char name[];  // NOLINT(bugprone-macro-parentheses): declares the name
-
 TUNNELRIG_EMBED(tunnelrig_page_template, TUNNELRIG_TEMPLATE_FILE)
 TUNNELRIG_EMBED(tunnelrig_page_style, TUNNELRIG_STYLE_FILE)
 TUNNELRIG_EMBED(tunnelrig_page_script, TUNNELRIG_SCRIPT_FILE)

@@ -1,0 +1,84 @@
+// A campaign file, a source, and one run after the other: what `log` does with a page and without.
+#pragma once
+
+#include "calibration/certificate.h"
+#include "cli/virtual_session.h"
+#include "daq/logger.h"
+#include "daq/run_plan.h"
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tunnelrig::cli {
+
+class ProgressBar;
+
+struct LogOptions {
+  std::string db, location, session, kind = "thrust", source = "virtual", plan, campaign, capture, pace = "1",
+                                     faults;
+  int repeat = 1;
+  double duration_s = 60;
+  std::uint64_t seed = 1;
+  std::optional<double> speed_rpm, temperature_C, pressure_Pa, humidity, supply_V, motor_s;
+  bool yes = false;
+
+  std::optional<int> live_port;  // --live
+  std::string listen;            // --listen, with --live
+};
+
+/// The run under way is to end; the whole program is. Set by Ctrl-C (both) and by the live page (the first).
+extern std::atomic<bool> stop_requested, quit_requested;
+
+/// What is told of a run to whoever watches it.
+struct LogWatch {
+  FrameSink* frames = nullptr;                                           // as LogSettings::watcher
+  std::function<void(const RunCells&)> begun;                            // before its first frame
+  std::function<void(const LogProgress&)> progress;                      // several times a second
+  std::function<void(const std::string& run, const LogOutcome&)> ended;  // before the next can begin
+};
+
+/// The recorder's side of the verb.
+class Logging {
+ public:
+  /// Opens or makes the campaign file. Throws InputError where it is recorded to already, and where the
+  /// source cannot be had.
+  explicit Logging(const LogOptions& options);
+
+  bool is_virtual() const { return virtual_.has_value(); }
+  CampaignFile& file() { return file_; }
+  const CampaignInfo& info() const { return info_; }
+
+  /// Records one run; the exit code. `note` stands beside the progress bar.
+  int record(const PlannedRun& planned, const std::string& note, const LogWatch& watch = {});
+
+  /// What the instruments read, from the next run on, in place of the options'.
+  LogOptions& options() { return options_; }
+
+ private:
+  double pace() const;
+  void add_conditions(const std::optional<InstrumentReadings>& shown, RunKind kind);
+  std::string means_text(const std::array<double, 4>& volts) const;
+  void show(ProgressBar& bar, const LogProgress& progress) const;
+  int report(const std::string& name, const PlannedRun& planned, const LogOutcome& outcome) const;
+
+  LogOptions options_;
+  CampaignFile file_;
+  CampaignInfo info_;
+  std::optional<Certificate> certificate_;
+  std::optional<VirtualSession> virtual_;
+  std::unique_ptr<PacketSource> source_;
+  RunCells conditions_;
+};
+
+/// The runs of a plan that the file does not hold: complete, and not excluded.
+std::vector<PlannedRun> runs_left(const CampaignFile& file, const std::vector<PlannedRun>& plan);
+
+/// `log --live`: the exit code.
+int run_live(const LogOptions& options);
+
+}  // namespace tunnelrig::cli
