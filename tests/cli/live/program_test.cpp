@@ -66,9 +66,6 @@ class Served {
 
   int stop(int signal = SIGINT) {
     ::kill(pid_, signal);
-    return wait();
-  }
-  int wait() {
     int status = 0;
     ::waitpid(pid_, &status, 0);
     pid_ = 0;
@@ -229,8 +226,7 @@ TEST_F(LivePage, WalksAPlanAndShowsTheMaps) {
     EXPECT_EQ(log.stop(SIGTERM), 0);
   }
   // and with --yes it ends by itself, having nothing left to do
-  Served again(folder.path(), "log --db c.db --plan plan.csv --live 0 --speed max --yes");
-  EXPECT_EQ(again.wait(), 0);
+  EXPECT_EQ(run("log --db c.db --plan plan.csv --live 0 --speed max --yes").code, 0);
   EXPECT_EQ(file().runs().size(), 11u);
 
   Served serve(folder.path(), "serve --db c.db --port 0");
