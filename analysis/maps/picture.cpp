@@ -133,9 +133,9 @@ std::string plain_axes() { return "set xtics -1,0.5,1 nomirror out\nset ytics -1
 std::string plot(bool dashed, double scale) {
   std::string command = "plot $field using 1:2:3 with image notitle";
   if (dashed)
-    command += fmt::format(
-        ", $mirrored with lines linecolor rgb '#303030' linewidth {:.3g} dashtype (9,6) notitle",
-        1.3 * scale);
+    command +=
+        fmt::format(", $mirrored with lines linecolor rgb '#303030' linewidth {:.3g} dashtype (9,6) notitle",
+                    1.3 * scale);
   return command + fmt::format(
                        ", $measured with lines linecolor rgb '#101010' linewidth {:.3g} notitle"
                        ", $crosses with lines linecolor rgb 'white' linewidth {:.3g} notitle"

@@ -92,7 +92,7 @@ Json best_of_one(const Json& flight) {
   const Json& best = best_of(flight);
   const auto interval = interval_mm(best);
   Json json{{"scenario", flight["scenario"]}, {"tunnel", flight["tunnel"]}, {"name", best["name"]},
-            {"contacts", best["contacts"]},   {"rms_mm", error_mm(best)},     {"ci95_mm", nullptr},
+            {"contacts", best["contacts"]},   {"rms_mm", error_mm(best)},   {"ci95_mm", nullptr},
             {"as_good", Json::array()}};
   if (interval) json["ci95_mm"] = {interval->first, interval->second};
   for (const Json& controller : flight["controllers"])
