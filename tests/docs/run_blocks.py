@@ -3,7 +3,7 @@
     run_blocks.py PROGRAM PAGE.md …             pages in this order, in one scratch folder
     run_blocks.py --pictures PROGRAM PAGE.md …  and puts the pictures that they make where the pages show them
 
-A block is indented by four spaces or fenced. It is run if a line of it begins with a command (COMMANDS below), or if it is Python.
+A block is indented by four spaces or fenced (but not as ```text). It is run if a line of it begins with a command (COMMANDS below), or if it is Python.
 A page says what else has to be, in comments that a reader does not see:
 
     <!-- before: COMMAND -->                    run first: what the page takes to be there
@@ -38,7 +38,7 @@ def parts(text):
             found.append(("directive", match[1], start))
         elif match := re.match(r"```(\w*)", line):
             end = next(k for k in range(i + 1, len(lines)) if lines[k].startswith("```"))
-            found.append(("output" if match[1] == "output" else "block", "\n".join(lines[i + 1:end]), start))
+            found.append((match[1] if match[1] in ("output", "text") else "block", "\n".join(lines[i + 1:end]), start))
             i = end
         elif line.startswith("    ") and (i == 0 or not lines[i - 1].strip()):
             end = i
