@@ -15,6 +15,7 @@ namespace tunnelrig::live {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::milliseconds kLook{1000};
 constexpr int kShare = 20;  // at most one part in so many of the time is spent reading
@@ -28,7 +29,6 @@ std::string fingerprint(const Reduction& reduction) {
 }
 
 std::string unreadable_json(const std::string& reason) {
-  using Json = nlohmann::ordered_json;
   const Json json{{"locations", Json::array()},
                   {"runs", Json::array()},
                   {"maps", nullptr},

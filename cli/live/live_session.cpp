@@ -12,6 +12,8 @@
 namespace tunnelrig::live {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 std::string own_name() {
   std::array<char, 256> name{};
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
@@ -51,7 +53,6 @@ CommandResult LiveSession::execute(const Command& command) {
 }
 
 void LiveSession::say_hello() {
-  using Json = nlohmann::ordered_json;
   const CampaignInfo& info = settings_.info;
   Json json{{"protocol", 1},
             {"mode", settings_.writable ? "log" : "file"},
