@@ -22,14 +22,23 @@ constexpr std::size_t kMostLines = 12;
 constexpr std::size_t kNoiseStep = 24;  // bins
 constexpr double kShaftBand = 0.04;
 
-/// Plans are made once per length; FFTW's planner is the one part of it that threads must not share.
+/// FFTW's planner, which also destroys, is the one part of it that threads must not share.
+std::mutex& planner() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+/// Made once per length and thread. A thread's end destroys its plans.
 struct Plan {
-  explicit Plan(std::size_t window)
-      : in(fftwf_alloc_real(window)),
-        out(fftwf_alloc_complex(window / 2 + 1)),
-        plan(fftwf_plan_dft_r2c_1d(static_cast<int>(window), in, out, FFTW_ESTIMATE)) {}
+  explicit Plan(std::size_t window) : in(fftwf_alloc_real(window)), out(fftwf_alloc_complex(window / 2 + 1)) {
+    const std::lock_guard lock(planner());
+    plan = fftwf_plan_dft_r2c_1d(static_cast<int>(window), in, out, FFTW_ESTIMATE);
+  }
   ~Plan() {
-    fftwf_destroy_plan(plan);
+    {
+      const std::lock_guard lock(planner());
+      fftwf_destroy_plan(plan);
+    }
     fftwf_free(in);
     fftwf_free(out);
   }
@@ -38,17 +47,13 @@ struct Plan {
 
   float* in;
   fftwf_complex* out;
-  fftwf_plan plan;
+  fftwf_plan plan = nullptr;
 };
 
 Plan& plan_for(std::size_t window) {
-  static std::mutex planner;
   thread_local std::map<std::size_t, std::unique_ptr<Plan>> plans;
   std::unique_ptr<Plan>& plan = plans[window];
-  if (!plan) {
-    const std::lock_guard lock(planner);
-    plan = std::make_unique<Plan>(window);
-  }
+  if (!plan) plan = std::make_unique<Plan>(window);
   return *plan;
 }
 

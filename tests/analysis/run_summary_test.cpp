@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <future>
 #include <map>
 #include <numbers>
 #include <random>
@@ -203,6 +204,22 @@ TEST(RunSummary, ShortRunsAndOneChannel) {
   EXPECT_EQ(summarize(data, one).channels.size(), 1u);
   EXPECT_EQ(summarize({}, {}).frames, 0u);
   EXPECT_EQ(summarize(test::example_frames(3, 1), {}).frames, 3u);
+}
+
+TEST(RunSummary, ThreadsThatComeAndGoAgree) {
+  const auto data = test::example_frames(9000, 1);
+  const RunStatistics alone = summarize(data, {});
+  for (int round = 0; round < 60; ++round) {
+    std::vector<std::future<RunStatistics>>
+        others;  // each makes its transforms' plans, and destroys them at its end
+    for (int i = 0; i < 4; ++i)
+      others.push_back(std::async(std::launch::async, [&] { return summarize(data, {}); }));
+    for (auto& other : others) {
+      const RunStatistics statistics = other.get();
+      EXPECT_EQ(statistics.channels[2].mean_V, alone.channels[2].mean_V);
+      ASSERT_EQ(statistics.channels[2].lines.size(), alone.channels[2].lines.size());
+    }
+  }
 }
 
 TEST(RunSummary, GapsMoveTimeOn) {
