@@ -270,7 +270,7 @@ TEST(Effects, TheDocumentsExampleOfExpressionsIsRead) {
   std::string toml;
   bool within = false;
   for (const std::string& line : page()) {
-    within = (within || line == "    [[effects]]") && !line.starts_with("    tunnelrig");
+    within = (within || line == "    [[effects]]") && (line.empty() || line.starts_with("    "));
     if (within) toml += line + "\n";
   }
   const std::vector<Effect> effects = parse_effects_toml(toml, "docs/effects.md");
