@@ -1,5 +1,6 @@
 // The USB path at full speed: the real libusb logger above a bus simulated by umockdev, into a campaign file;
 // then the same with faults injected into every part of it. Simulator and logger share the processor.
+#include "bench/stand_in_ioctl.h"
 #include "daq/logging.h"
 #include "daq/packets.h"
 #include "daq/usb_source.h"
@@ -111,8 +112,8 @@ struct Check : FrameSink {
   bool known = false;
 };
 
-/// What the logger costs in real time: the process without the simulated board's thread and umockdev's, which
-/// stand for board and kernel.
+/// What the logger costs in real time: the process without the simulated board's thread, umockdev's, and what
+/// umockdev does within ioctl(), which stand for board and kernel.
 void rig_rate(double duration_s) {
   simulated::Board board;
   simulated::UsbBus bus(board, simulated::Pace::kRig);
@@ -123,6 +124,7 @@ void rig_rate(double duration_s) {
   rusage before{}, after{};
   ::getrusage(RUSAGE_SELF, &before);
   const double simulator_before_s = bus.processor_s();
+  const double ioctl_before_s = ioctl_processor_s();
   const LogOutcome outcome = log_run(*source, file, test::cells("R1"), {.duration_s = duration_s},
                                      test::summarizer(), {}, test::never_stop());
   ::getrusage(RUSAGE_SELF, &after);
@@ -132,11 +134,14 @@ void rig_rate(double duration_s) {
   const double used_s =
       seconds(after.ru_utime) + seconds(after.ru_stime) - seconds(before.ru_utime) - seconds(before.ru_stime);
   const double simulator_s = bus.processor_s() - simulator_before_s;
+  const double ioctl_s = ioctl_processor_s() - ioctl_before_s;
+  const auto percent = [&](double spent_s) { return 100 * spent_s / duration_s; };
   fmt::print(
-      "rig rate, {:g} s: {:.2f} % of a core for the logger; {:.2f} % for the simulated board and umockdev "
-      "beside it; "
-      "{:.1f} MB at most; {} lost\n",
-      duration_s, 100 * (used_s - simulator_s) / duration_s, 100 * simulator_s / duration_s,
+      "rig rate, {:g} s: {:.2f} % of a core for the logger, and {:.2f} % within ioctl(), where umockdev "
+      "stands for the kernel;\n{:.2f} % for the simulated board and umockdev's thread beside it; {:.1f} MB "
+      "at "
+      "most; {} lost\n",
+      duration_s, percent(used_s - simulator_s - ioctl_s), percent(ioctl_s), percent(simulator_s),
       static_cast<double>(after.ru_maxrss) / 1024, outcome.ledger.frames_lost);
 }
 
