@@ -43,8 +43,10 @@ class Ibs {
       const IbsLaw law = ibs_law(form_, gains_.k1[i], gains_.k2[i], gains_.k3[i]);
       const double error = in.reference.position_m[i] - in.position_m[i];
       const double error_rate = in.reference.velocity_m_s[i] - in.velocity_m_s[i];
-      const double limit = gains_.integral_limit_m_s2 / std::max(law.integral, 1e-9);
-      beta_[i] = std::clamp(beta_[i] + error * in.step_s, -limit, limit);
+      beta_[i] += error * in.step_s;
+      // Divided only where it is reached: a division costs as much as the rest of the step.
+      if (std::abs(law.integral * beta_[i]) > gains_.integral_limit_m_s2)
+        beta_[i] = std::copysign(gains_.integral_limit_m_s2 / law.integral, beta_[i]);
       wanted[i] = in.reference.acceleration_m_s2[i] + gains_.lead_s * in.reference.jerk_m_s3[i] +
                   law.proportional * error + law.derivative * error_rate + law.integral * beta_[i];
     }

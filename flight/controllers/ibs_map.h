@@ -21,18 +21,23 @@ struct ControllerContext {
 class IbsMap {
  public:
   IbsMap(const IbsGains& gains, const ControllerContext& context)
-      : ibs_(IbsForm::kLyapunov, gains), context_(context) {}
+      : ibs_(IbsForm::kLyapunov, gains),
+        map_(context.map),
+        centre_m_{context.scale.centre_y_m, context.scale.centre_z_m},
+        per_half_span_{1 / context.scale.half_span_y_m, 1 / context.scale.half_span_z_m},
+        moment_arm_kg_m_(context.rotor_offset_m * context.mass_kg) {}
 
   ControlOutput step(const ControlInput& in) {
     ControlOutput out = thrust_vector(ibs_.wanted_acceleration(in), in.cos_tilt, ibs_.limits());
-    if (context_.map == nullptr) return out;
+    if (map_ == nullptr) return out;
     // The motors need their lag to answer: the map is read where the vehicle will be then.
-    const double y_m = in.position_m[0] + ahead_s_ * in.velocity_m_s[0];
-    const double z_m = in.position_m[1] + ahead_s_ * in.velocity_m_s[1];
-    const Disturbance d = context_.map->at(context_.scale.y_norm(y_m), context_.scale.z_norm(z_m));
+    const auto ahead_norm = [&](std::size_t i) {
+      return (in.position_m[i] + ahead_s_ * in.velocity_m_s[i] - centre_m_[i]) * per_half_span_[i];
+    };
+    const Disturbance d = map_->at(ahead_norm(0), ahead_norm(1));
+    // The moment is that of the thrust divided by 1 + ΔC_T, times 1 + ΔC_T.
+    out.roll_moment_N_m = -d.uneven * moment_arm_kg_m_ * out.thrust_m_s2;
     out.thrust_m_s2 /= 1 + d.thrust_change;
-    out.roll_moment_N_m =
-        -d.uneven * (1 + d.thrust_change) * context_.rotor_offset_m * context_.mass_kg * out.thrust_m_s2;
     return out;
   }
 
@@ -41,7 +46,9 @@ class IbsMap {
 
  private:
   Ibs ibs_;
-  ControllerContext context_;
+  const DisturbanceField* map_;
+  Plane centre_m_, per_half_span_;  // of the section: ȳ and z̄ without a division
+  double moment_arm_kg_m_;
   double ahead_s_ = 0.05;
 };
 

@@ -15,7 +15,7 @@ double small_atan(double x) {
 
 }  // namespace
 
-double AltitudeCascade::step(const ControlInput& in) {
+double AltitudeCascade::step(const ControlInput& in, double per_step_Hz) {
   const double to_go = in.reference.position_m[1] - in.position_m[1];
   const double velocity =
       std::clamp(square_root_law(to_go, gains_.position_p, gains_.acceleration_limit_m_s2) +
@@ -33,11 +33,12 @@ double AltitudeCascade::step(const ControlInput& in) {
   integral_ = std::clamp(integral_ + kScale * gains_.acceleration_i * error_ * in.step_s,
                          -gains_.integral_limit, gains_.integral_limit);
   const double throttle = kScale * gains_.acceleration_p * error_ + integral_ +
-                          kScale * gains_.acceleration_d * (error_ - previous) / in.step_s;
+                          kScale * gains_.acceleration_d * (error_ - previous) * per_step_Hz;
   return (kGravity_m_s2 + full_thrust_m_s2_ * throttle) / std::max(in.cos_tilt, 0.5);
 }
 
 ControlOutput PidCascade::step(const ControlInput& in) {
+  const double per_step_Hz = 1 / in.step_s;
   const double to_go = in.reference.position_m[0] - in.position_m[0];
   const double velocity =
       std::clamp(square_root_law(to_go, lateral_.position_p, 0.5 * lateral_.acceleration_limit_m_s2) +
@@ -46,15 +47,16 @@ ControlOutput PidCascade::step(const ControlInput& in) {
   const double share = low_pass_share(lateral_.velocity_filter_Hz, in.step_s);
   const double previous = error_;
   error_ += share * (velocity - in.velocity_m_s[0] - error_);
-  if (primed_) derivative_ += share * ((error_ - previous) / in.step_s - derivative_);
+  if (primed_) derivative_ += share * ((error_ - previous) * per_step_Hz - derivative_);
   primed_ = true;
   integral_ = std::clamp(integral_ + lateral_.velocity_i * error_ * in.step_s, -lateral_.integral_limit_m_s2,
                          lateral_.integral_limit_m_s2);
   const double acceleration =
       std::clamp(lateral_.velocity_p * error_ + integral_ + lateral_.velocity_d * derivative_,
                  -lateral_.acceleration_limit_m_s2, lateral_.acceleration_limit_m_s2);
-  return {std::clamp(altitude_.step(in), limits_.lowest_thrust_m_s2, limits_.highest_thrust_m_s2),
-          std::clamp(-small_atan(acceleration / kGravity_m_s2), -limits_.roll_rad, limits_.roll_rad), 0};
+  return {
+      std::clamp(altitude_.step(in, per_step_Hz), limits_.lowest_thrust_m_s2, limits_.highest_thrust_m_s2),
+      std::clamp(-small_atan(acceleration * (1 / kGravity_m_s2)), -limits_.roll_rad, limits_.roll_rad), 0};
 }
 
 void PidCascade::reset() {
@@ -70,8 +72,9 @@ ControlOutput PidSingle::step(const ControlInput& in) {
                              lateral_.integral_limit_rad);
   const double u_phi = lateral_.p * error + integral_rad_ + lateral_.d * error_rate;  // (6.16)
   // A positive roll accelerates to the left (3.5), so the angle has the sign of −u_φ.
-  return {std::clamp(altitude_.step(in), limits_.lowest_thrust_m_s2, limits_.highest_thrust_m_s2),
-          std::clamp(-u_phi, -limits_.roll_rad, limits_.roll_rad), 0};
+  return {
+      std::clamp(altitude_.step(in, 1 / in.step_s), limits_.lowest_thrust_m_s2, limits_.highest_thrust_m_s2),
+      std::clamp(-u_phi, -limits_.roll_rad, limits_.roll_rad), 0};
 }
 
 void PidSingle::reset() {

@@ -27,8 +27,8 @@ class AltitudeCascade {
   AltitudeCascade(const AltitudeGains& gains, double full_thrust_m_s2, bool feed_forward)
       : gains_(gains), full_thrust_m_s2_(full_thrust_m_s2), feed_forward_(feed_forward) {}
 
-  /// u₁, with the angle boost 1/(cos φ cos θ).
-  double step(const ControlInput& in);
+  /// u₁, with the angle boost 1/(cos φ cos θ). `per_step_Hz` is 1/step_s, which its caller needs as well.
+  double step(const ControlInput& in, double per_step_Hz);
 
   void reset() { *this = AltitudeCascade(gains_, full_thrust_m_s2_, feed_forward_); }
   AltitudeGains& gains() { return gains_; }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tunnelrig {
 namespace {
@@ -77,39 +78,40 @@ Layer mirrored(const MapGrid& grid, const std::vector<double>& right_value, doub
   return layer;
 }
 
-/// For every bucket of [low, 1] the cell that its lower end lies in.
-std::vector<std::size_t> buckets(const std::vector<double>& x, double low) {
-  std::vector<std::size_t> at(kBuckets);
-  for (std::size_t b = 0; b < kBuckets; ++b) {
-    const double end = low + (1 - low) * static_cast<double>(b) / kBuckets;
-    while (at[b] + 2 < x.size() && x[at[b] + 1] <= end) ++at[b];
-  }
-  return at;
-}
-
-/// The cell of a value that lies on the axis.
-std::size_t cell_of(double value, double low, const std::vector<double>& x,
-                    const std::vector<std::size_t>& at) {
-  const auto bucket = static_cast<std::size_t>((value - low) / (1 - low) * kBuckets);
-  std::size_t cell = at[std::min(bucket, kBuckets - 1)];
-  while (cell + 2 < x.size() && x[cell + 1] <= value) ++cell;
-  return cell;
-}
-
 /// Hermite's cubic basis on a cell of this width: weights of value and slope at its lower and upper end.
 struct Basis {
   double low, low_slope, high, high_slope;
 
   Basis(double t, double width) {
     const double t2 = t * t, t3 = t2 * t;
-    high = 3 * t2 - 2 * t3;
+    high = t2 * (3 - 2 * t);
     low = 1 - high;
-    low_slope = (t3 - 2 * t2 + t) * width;
     high_slope = (t3 - t2) * width;
+    low_slope = high_slope + (t - t2) * width;
   }
 };
 
 }  // namespace
+
+DisturbanceField::Axis::Axis(const std::vector<double>& nodes) {
+  for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
+    const double width = nodes[i + 1] - nodes[i];
+    cells.push_back({nodes[i], nodes[i + 1], width, 1 / width});
+  }
+  cells.back().high = std::numeric_limits<double>::infinity();  // ends every search
+  const double low = nodes.front();
+  for (std::size_t b = 0; b <= kBuckets; ++b) {
+    const double end = low + (1 - low) * static_cast<double>(b) / kBuckets;
+    buckets.push_back(b > 0 ? buckets.back() : 0);
+    while (cells[buckets.back()].high <= end) ++buckets.back();
+  }
+}
+
+inline std::size_t DisturbanceField::Axis::cell_of(double value, double share) const {
+  std::size_t cell = buckets[static_cast<std::uint32_t>(share * kBuckets)];
+  while (cells[cell].high <= value) ++cell;
+  return cell;
+}
 
 DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, double thrust_error,
                                    double uneven_error) {
@@ -124,19 +126,18 @@ DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, doub
   const std::array<Layer, 2> layers = {mirrored(map.grid, fractions(map.delta_ct, thrust_error), 1),
                                        mirrored(map.grid, fractions(map.uneven_thrust, uneven_error), -1)};
   const std::size_t columns = layers[0].y.size(), first = columns / 2;
-  y_.assign(layers[0].y.begin() + static_cast<std::ptrdiff_t>(first), layers[0].y.end());
-  z_ = layers[0].z;
-  y_at_ = buckets(y_, 0);
-  z_at_ = buckets(z_, -1);
-  for (std::size_t i = 1; i < y_.size(); ++i) per_width_.push_back(1 / (y_[i] - y_[i - 1]));
-  for (std::size_t i = 1; i < z_.size(); ++i) per_height_.push_back(1 / (z_[i] - z_[i - 1]));
-  nodes_.resize(y_.size() * z_.size());
+  const std::vector<double> right(layers[0].y.begin() + static_cast<std::ptrdiff_t>(first),
+                                  layers[0].y.end());
+  const std::vector<double>& z = layers[0].z;
+  y_ = Axis(right);
+  z_ = Axis(z);
+  nodes_.resize(right.size() * z.size());
   for (std::size_t k = 0; k < layers.size(); ++k) {
     const auto f_y = layers[k].along_y(layers[k].value), f_z = layers[k].along_z(layers[k].value);
     const auto f_yz = layers[k].along_z(f_y);
-    for (std::size_t row = 0; row < z_.size(); ++row) {
-      for (std::size_t c = 0; c < y_.size(); ++c) {
-        Node& node = nodes_[row * y_.size() + c];
+    for (std::size_t row = 0; row < z.size(); ++row) {
+      for (std::size_t c = 0; c < right.size(); ++c) {
+        Node& node = nodes_[row * right.size() + c];
         const std::size_t i = row * columns + first + c;
         node.f[k] = layers[k].value[i];
         node.f_y[k] = f_y[i];
@@ -149,12 +150,16 @@ DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, doub
 
 Disturbance DisturbanceField::at(double y_norm, double z_norm) const {
   if (nodes_.empty()) return {};
-  const double y = std::min(std::abs(y_norm), 1.0), z = std::clamp(z_norm, -1.0, 1.0);
-  const std::size_t c = cell_of(y, 0, y_, y_at_), r = cell_of(z, -1, z_, z_at_);
-  const double width = y_[c + 1] - y_[c], height = z_[r + 1] - z_[r];
-  const Basis by((y - y_[c]) * per_width_[c], width), bz((z - z_[r]) * per_height_[r], height);
-  const Node* low = &nodes_[r * y_.size() + c];
-  const Node* high = low + y_.size();
+  // In this order NaN becomes a number, so that it never is an index.
+  const double y = std::min(1.0, std::abs(y_norm)), z = std::max(-1.0, std::min(1.0, z_norm));
+  const std::size_t c = y_.cell_of(y, y), r = z_.cell_of(z, 0.5 * (z + 1));
+  const Cell& cell_y = y_.cells[c];
+  const Cell& cell_z = z_.cells[r];
+  const Basis by((y - cell_y.low) * cell_y.per_width, cell_y.width);
+  const Basis bz((z - cell_z.low) * cell_z.per_width, cell_z.width);
+  const std::size_t columns = y_.cells.size() + 1;
+  const Node* low = &nodes_[r * columns + c];
+  const Node* high = low + columns;
   double value[2];
   for (std::size_t k = 0; k < 2; ++k) {
     const auto across = [&](const Node* row) {

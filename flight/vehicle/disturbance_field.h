@@ -3,6 +3,7 @@
 
 #include "analysis/maps/disturbance_map.h"
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -43,10 +44,24 @@ class DisturbanceField {
     double f[2]{}, f_y[2]{}, f_z[2]{}, f_yz[2]{};  // ΔC_T and U, fractions
   };
 
-  std::vector<double> y_, z_;                   // y_ from 0 to 1
-  std::vector<double> per_width_, per_height_;  // of every cell
-  std::vector<std::size_t> y_at_, z_at_;        // buckets: where to begin the search for a cell
-  std::vector<Node> nodes_;                     // row by row, rows follow z
+  struct Cell {
+    double low, high, width, per_width;
+  };
+
+  /// The cells between an axis's nodes, and where to begin the search for one.
+  struct Axis {
+    std::vector<Cell> cells;
+    std::vector<std::uint32_t> buckets;  // for equal parts of [low, 1], the cell of its lower end
+
+    Axis() = default;
+    explicit Axis(const std::vector<double>& nodes);
+
+    /// `share` of [low, 1] is where `value` lies, which is on the axis.
+    std::size_t cell_of(double value, double share) const;
+  };
+
+  Axis y_, z_;               // y_ from 0 to 1
+  std::vector<Node> nodes_;  // row by row, rows follow z
 };
 
 /// The field that datasets/published_field.h invents within the thesis's claims, for the rig's geometry, on
