@@ -5,13 +5,11 @@
 #include "datasets/schema.h"
 #include "datasets/sqlite.h"
 
-#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <system_error>
 
 #include <fcntl.h>
-#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 namespace tunnelrig {
@@ -180,130 +178,6 @@ void CampaignFile::set_text(std::string_view name, std::string_view text) {
   Statement(*database_, "INSERT OR REPLACE INTO texts (name, text) VALUES (?, ?)")
       .bind(name)
       .bind(text)
-      .run();
-}
-
-std::optional<Sheet> CampaignFile::sheet(std::string_view name) const {
-  Statement columns(*database_, "SELECT columns FROM sheets WHERE sheet = ?");
-  columns.bind(name);
-  if (!columns.step()) return {};
-  Sheet sheet;
-  sheet.file = fmt::format("{}.csv", name);
-  sheet.columns = nlohmann::json::parse(columns.text(0)).get<std::vector<std::string>>();
-  Statement rows(*database_, "SELECT cells FROM sheet_rows WHERE sheet = ? ORDER BY row");
-  rows.bind(name);
-  while (rows.step()) {
-    auto cells = nlohmann::json::parse(rows.text(0)).get<std::vector<std::string>>();
-    cells.resize(sheet.columns.size());  // rows written before a column was added are shorter
-    sheet.rows.push_back({std::move(cells), static_cast<int>(sheet.rows.size()) + 2});
-  }
-  return sheet;
-}
-
-void CampaignFile::set_sheet(std::string_view name, const Sheet& sheet) {
-  Statement(*database_, "DELETE FROM sheets WHERE sheet = ?").bind(name).run();
-  Statement(*database_, "INSERT INTO sheets (sheet, columns) VALUES (?, ?)")
-      .bind(name)
-      .bind(nlohmann::json(sheet.columns).dump())
-      .run();
-  Statement insert(*database_, "INSERT INTO sheet_rows (sheet, row, cells) VALUES (?, ?, ?)");
-  for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
-    insert.bind(name)
-        .bind(static_cast<std::int64_t>(row))
-        .bind(nlohmann::json(sheet.rows[row].cells).dump())
-        .run();
-  }
-}
-
-void CampaignFile::append_row(std::string_view name,
-                              const std::vector<std::pair<std::string, std::string>>& cells) {
-  Statement select(*database_, "SELECT columns FROM sheets WHERE sheet = ?");
-  select.bind(name);
-  std::vector<std::string> columns;
-  const bool exists = select.step();
-  if (exists) columns = nlohmann::json::parse(select.text(0)).get<std::vector<std::string>>();
-  select.reset();
-  Sheet row{.file = "", .columns = columns, .rows = {{std::vector<std::string>(columns.size()), 0}}};
-  for (const auto& [column, text] : cells) {
-    const std::size_t index = row.ensure(column);
-    row.rows[0].cells[index] = text;
-  }
-  if (row.columns != columns) {
-    Statement(*database_,
-              "INSERT INTO sheets (sheet, columns) VALUES (?1, ?2) "
-              "ON CONFLICT (sheet) DO UPDATE SET columns = ?2")
-        .bind(name)
-        .bind(nlohmann::json(row.columns).dump())
-        .run();
-  }
-  Statement(*database_,
-            "INSERT INTO sheet_rows (sheet, row, cells) "
-            "SELECT ?1, coalesce(max(row), -1) + 1, ?2 FROM sheet_rows WHERE sheet = ?1")
-      .bind(name)
-      .bind(nlohmann::json(row.rows[0].cells).dump())
-      .run();
-}
-
-namespace {
-
-/// A row of a sheet, found by one of its cells.
-struct FoundRow {
-  std::vector<std::string> columns, cells;
-  std::int64_t row = 0;
-};
-
-std::vector<std::string> texts_of(const std::string& json) {
-  return nlohmann::json::parse(json).get<std::vector<std::string>>();
-}
-
-FoundRow find_row(const Database& database, std::string_view name, std::string_view key,
-                  std::string_view value) {
-  FoundRow found;
-  Statement columns(database, "SELECT columns FROM sheets WHERE sheet = ?");
-  columns.bind(name);
-  if (columns.step()) found.columns = texts_of(columns.text(0));
-  const auto at = std::find(found.columns.begin(), found.columns.end(), key);
-  if (at != found.columns.end()) {
-    Statement select(database,
-                     "SELECT row, cells FROM sheet_rows WHERE sheet = ? AND json_extract(cells, ?) = ?");
-    select.bind(name).bind(fmt::format("$[{}]", at - found.columns.begin())).bind(value);
-    if (select.step()) {
-      found.row = select.integer(0);
-      found.cells = texts_of(select.text(1));
-      found.cells.resize(found.columns.size());
-      return found;
-    }
-  }
-  throw InputError(fmt::format("there is no {} {}", key, value));
-}
-
-}  // namespace
-
-std::string CampaignFile::cell(std::string_view name, std::string_view key, std::string_view value,
-                               std::string_view column) const {
-  const FoundRow found = find_row(*database_, name, key, value);
-  const auto at = std::find(found.columns.begin(), found.columns.end(), column);
-  return at == found.columns.end() ? "" : found.cells[static_cast<std::size_t>(at - found.columns.begin())];
-}
-
-void CampaignFile::set_cell(std::string_view name, std::string_view key, std::string_view value,
-                            std::string_view column, std::string_view text) {
-  FoundRow found = find_row(*database_, name, key, value);
-  auto at = std::find(found.columns.begin(), found.columns.end(), column);
-  if (at == found.columns.end()) {
-    if (text.empty()) return;
-    at = found.columns.insert(found.columns.end(), std::string(column));
-    found.cells.emplace_back();
-    Statement(*database_, "UPDATE sheets SET columns = ? WHERE sheet = ?")
-        .bind(nlohmann::json(found.columns).dump())
-        .bind(name)
-        .run();
-  }
-  found.cells[static_cast<std::size_t>(at - found.columns.begin())] = text;
-  Statement(*database_, "UPDATE sheet_rows SET cells = ? WHERE sheet = ? AND row = ?")
-      .bind(nlohmann::json(found.cells).dump())
-      .bind(name)
-      .bind(found.row)
       .run();
 }
 
