@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <set>
 
 #include <fmt/format.h>
 
@@ -19,19 +18,16 @@ using live::LiveRun;
 using live::Phase;
 
 live::LiveSettings live_settings(const LogOptions& options, Logging& logging, std::vector<PlannedRun> plan) {
-  return {.campaign = options.db,
-          .info = logging.info(),
-          .plan = std::move(plan),
-          .source = options.source,
-          .program = "tunnelrig " + program_version(),
-          .address = options.listen.empty() ? "127.0.0.1" : options.listen,
-          .port = *options.live_port,
-          .metadata = {{"speed_rpm", options.speed_rpm},
-                       {"air_temperature_C", options.temperature_C},
-                       {"air_pressure_Pa", options.pressure_Pa},
-                       {"relative_humidity", options.humidity},
-                       {"supply_voltage_V", options.supply_V},
-                       {"time_since_motor_start_s", options.motor_s}}};
+  live::LiveSettings settings{.campaign = options.db,
+                              .info = logging.info(),
+                              .plan = std::move(plan),
+                              .source = options.source,
+                              .program = "tunnelrig " + program_version(),
+                              .address = options.listen.empty() ? "127.0.0.1" : options.listen,
+                              .port = *options.live_port,
+                              .metadata = {}};
+  for (const auto& [column, value] : kConditionOptions) settings.metadata.emplace(column, options.*value);
+  return settings;
 }
 
 /// The loop that logs: one run at a time, what the plan or the page says.
@@ -178,12 +174,11 @@ class LiveLogging {
   }
 
   void apply_metadata() {
-    LogOptions& options = logging_.options();
-    const std::map<std::string, std::optional<double>*> places = {
-        {"speed_rpm", &options.speed_rpm},         {"air_temperature_C", &options.temperature_C},
-        {"air_pressure_Pa", &options.pressure_Pa}, {"relative_humidity", &options.humidity},
-        {"supply_voltage_V", &options.supply_V},   {"time_since_motor_start_s", &options.motor_s}};
-    for (const auto& [name, value] : page_.desk().metadata()) *places.at(name) = value;
+    const auto metadata = page_.desk().metadata();
+    for (const auto& [column, value] : kConditionOptions) {
+      if (const auto said = metadata.find(column); said != metadata.end())
+        logging_.options().*value = said->second;
+    }
   }
 
   void begin(const PlannedRun& planned, const RunCells& cells) {

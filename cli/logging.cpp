@@ -52,8 +52,8 @@ Logging::Logging(const LogOptions& options)
 }
 
 int Logging::record(const PlannedRun& planned, const std::string& note, const LogWatch& watch) {
-  const std::string name =
-      fmt::format("R{:04}", (file_.sheet("runs") ? file_.sheet("runs")->rows.size() : 0) + 1);
+  const auto runs = file_.sheet("runs");
+  const std::string name = fmt::format("R{:04}", (runs ? runs->rows.size() : 0) + 1);
   double start_s = now_s();
   std::unique_ptr<PacketSource> board;
   RunCells cells = {{"run", name},

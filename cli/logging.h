@@ -6,6 +6,7 @@
 #include "daq/logger.h"
 #include "daq/run_plan.h"
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -30,6 +31,19 @@ struct LogOptions {
   std::optional<int> live_port;  // --live
   std::string listen;            // --listen, with --live
 };
+
+/// What the instruments beside the board read, by the column that it is stored in.
+struct ConditionOption {
+  const char* column;
+  std::optional<double> LogOptions::*value;
+};
+inline constexpr std::array<ConditionOption, 6> kConditionOptions = {
+    {{"speed_rpm", &LogOptions::speed_rpm},
+     {"air_temperature_C", &LogOptions::temperature_C},
+     {"air_pressure_Pa", &LogOptions::pressure_Pa},
+     {"relative_humidity", &LogOptions::humidity},
+     {"supply_voltage_V", &LogOptions::supply_V},
+     {"time_since_motor_start_s", &LogOptions::motor_s}}};
 
 /// The run under way is to end; the whole program is. Set by Ctrl-C (both) and by the live page (the first).
 extern std::atomic<bool> stop_requested, quit_requested;

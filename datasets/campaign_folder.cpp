@@ -163,9 +163,10 @@ class RawImport {
       : file_(file), folder_(std::move(folder)), info_(info), options_(options), summary_(summary) {}
 
   void add(const Run& run) {
-    auto raw = std::make_unique<RunInWork>(run, raw_path(folder_, run));
+    const fs::path path = raw_path(folder_, run);
+    auto raw = std::make_unique<RunInWork>(run, path);
     check_samples(raw->npy, info_, run);
-    raw->gaps = read_gaps(gaps_path(raw_path(folder_, run)), raw->npy.frames());
+    raw->gaps = read_gaps(gaps_path(path), raw->npy.frames());
     const RawFormat format = raw->npy.format();
     raw->summarizer = options_.summarizer(info_, format);
     raw->statistics = std::async(std::launch::async, [&work = *raw, frame = format.frame_size()] {

@@ -5,6 +5,7 @@
 #include "campaigns.h"
 #include "datasets/csv.h"
 #include "support/message_of.h"
+#include "support/occurrences.h"
 #include "support/temporary_folder.h"
 
 #include <algorithm>
@@ -21,14 +22,9 @@ namespace tunnelrig {
 namespace {
 
 using test::message_of;
+using test::occurrences;
 using testing::HasSubstr;
 using testing::Not;
-
-std::size_t occurrences(std::string_view text, std::string_view part) {
-  std::size_t found = 0;
-  for (auto at = text.find(part); at != std::string_view::npos; at = text.find(part, at + 1)) ++found;
-  return found;
-}
 
 double big_endian(std::string_view bytes) {
   double value = 0;

@@ -1,5 +1,7 @@
 #include "analysis/report/render.h"
 
+#include "support/occurrences.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -7,14 +9,9 @@
 namespace tunnelrig {
 namespace {
 
+using test::occurrences;
 using testing::HasSubstr;
 using testing::Not;
-
-std::size_t count(std::string_view text, std::string_view part) {
-  std::size_t found = 0;
-  for (auto at = text.find(part); at != std::string_view::npos; at = text.find(part, at + 1)) ++found;
-  return found;
-}
 
 /// What the page's scripts read back.
 nlohmann::json data_of(const std::string& page) {
@@ -28,9 +25,9 @@ TEST(RenderReport, TextsCannotBreakThePage) {
   for (const std::string name :
        {"</script><b>", "<!--<script>", "{{plotly}} {{script}}", "\xE2\x80\xA8 ' \" \\ &lt;"}) {
     const std::string page = render_report(nlohmann::json{{"name", name}}.dump());
-    EXPECT_EQ(count(page, "</script"), count(harmless, "</script")) << name;
-    EXPECT_EQ(count(page, "<script"), count(harmless, "<script")) << name;
-    EXPECT_EQ(count(page, "<!--"), count(harmless, "<!--")) << name;
+    EXPECT_EQ(occurrences(page, "</script"), occurrences(harmless, "</script")) << name;
+    EXPECT_EQ(occurrences(page, "<script"), occurrences(harmless, "<script")) << name;
+    EXPECT_EQ(occurrences(page, "<!--"), occurrences(harmless, "<!--")) << name;
     EXPECT_EQ(data_of(page)["name"], name);
   }
 }
