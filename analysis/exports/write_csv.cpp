@@ -3,8 +3,10 @@
 #include "analysis/exports/writer.h"
 #include "datasets/csv.h"
 
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <optional>
 #include <string>
@@ -33,6 +35,38 @@ char* append_samples(const std::byte* from, std::size_t columns, char* to) {
     std::memcpy(&value, from + c * sizeof(value), sizeof(value));
     to = std::to_chars(to, to + kLongestCell, value).ptr;
     *to++ = ',';
+  }
+  return to;
+}
+
+/// The text of an int16 with its comma, "-32768," at the longest.
+struct CountText {
+  std::array<char, 7> text{};
+  std::uint8_t size = 0;
+};
+
+std::vector<CountText> make_count_texts() {
+  std::vector<CountText> texts(1 << 16);
+  for (int count = -32768; count <= 32767; ++count) {
+    CountText& made = texts[static_cast<std::uint16_t>(count)];
+    char* end = std::to_chars(made.text.data(), made.text.data() + made.text.size(), count).ptr;
+    *end++ = ',';
+    made.size = static_cast<std::uint8_t>(end - made.text.data());
+  }
+  return texts;
+}
+
+/// Most of an export is counts; looked up they take a quarter of the time that it takes to divide them by
+/// ten.
+template <>
+char* append_samples<std::int16_t>(const std::byte* from, std::size_t columns, char* to) {
+  static const std::vector<CountText> texts = make_count_texts();
+  for (std::size_t c = 0; c < columns; ++c) {
+    std::uint16_t bits;
+    std::memcpy(&bits, from + c * sizeof(bits), sizeof(bits));
+    const CountText& count = texts[bits];
+    std::memcpy(to, count.text.data(), count.text.size());  // kLongestCell leaves room behind the comma
+    to += count.size;
   }
   return to;
 }
