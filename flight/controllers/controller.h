@@ -7,6 +7,7 @@
 #pragma once
 
 #include "flight/vehicle/airframe.h"
+#include "flight/vehicle/quick_angles.h"
 
 #include <algorithm>
 #include <array>
@@ -39,16 +40,6 @@ struct OutputLimits {
   double lowest_thrust_m_s2 = 2, highest_thrust_m_s2 = 2 * kGravity_m_s2;
   double roll_rad = 0.4;
 };
-
-/// Arc sine: its series up to 0.3, to 2e-12, where nearly all of a flight is, the library's beyond.
-inline double quick_asin(double x) {
-  const double x2 = x * x, x4 = x2 * x2, x8 = x4 * x4;
-  if (x2 > 0.09) return std::asin(x);
-  const double low = (1 + x2 * (1.0 / 6)) + x4 * (3.0 / 40 + x2 * (15.0 / 336));
-  const double high =
-      (105.0 / 3456 + x2 * (945.0 / 42240)) + x4 * (10395.0 / 599040 + x2 * (135135.0 / 9676800));
-  return x * (low + x8 * (high + x8 * (34459425.0 / 2972712960.0)));
-}
 
 /// u₁ and φ that accelerate by `wanted`: (6.29) and (6.30), which solve (3.5).
 inline ControlOutput thrust_vector(const Plane& wanted_m_s2, double cos_tilt, const OutputLimits& limits) {

@@ -1,20 +1,6 @@
 #include "flight/controllers/pid.h"
 
 namespace tunnelrig {
-namespace {
-
-/// Arc tangent to 1e-10 up to 0.26, which the limit of the acceleration keeps to: half the time of the
-/// library's.
-double small_atan(double x) {
-  const double x2 = x * x, x4 = x2 * x2;
-  if (x2 > 0.26 * 0.26) return std::atan(x);
-  return x * ((1 - x2 * (1.0 / 3)) +
-              x4 * ((1.0 / 5 - x2 * (1.0 / 7)) +
-                    x4 * ((1.0 / 9 - x2 * (1.0 / 11)) + x4 * (1.0 / 13 - x2 * (1.0 / 15)))));
-}
-
-}  // namespace
-
 double AltitudeCascade::step(const ControlInput& in, double per_step_Hz) {
   const double to_go = in.reference.position_m[1] - in.position_m[1];
   const double velocity =
@@ -56,7 +42,7 @@ ControlOutput PidCascade::step(const ControlInput& in) {
                  -lateral_.acceleration_limit_m_s2, lateral_.acceleration_limit_m_s2);
   return {
       std::clamp(altitude_.step(in, per_step_Hz), limits_.lowest_thrust_m_s2, limits_.highest_thrust_m_s2),
-      std::clamp(-small_atan(acceleration * (1 / kGravity_m_s2)), -limits_.roll_rad, limits_.roll_rad), 0};
+      std::clamp(-quick_atan(acceleration * (1 / kGravity_m_s2)), -limits_.roll_rad, limits_.roll_rad), 0};
 }
 
 void PidCascade::reset() {

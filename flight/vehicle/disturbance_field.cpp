@@ -83,20 +83,20 @@ struct Basis {
   double low, low_slope, high, high_slope;
 
   Basis(double t, double width) {
-    const double t2 = t * t, t3 = t2 * t;
+    const double t2 = t * t, back = t - 1, back_width = back * width;
     high = t2 * (3 - 2 * t);
     low = 1 - high;
-    high_slope = (t3 - t2) * width;
-    low_slope = high_slope + (t - t2) * width;
+    low_slope = t * back * back_width;
+    high_slope = t2 * back_width;
   }
 };
 
 }  // namespace
 
-DisturbanceField::Axis::Axis(const std::vector<double>& nodes) {
+DisturbanceField::Axis::Axis(const std::vector<double>& nodes, std::size_t stride) {
   for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
     const double width = nodes[i + 1] - nodes[i];
-    cells.push_back({nodes[i], nodes[i + 1], width, 1 / width});
+    cells.push_back({nodes[i], nodes[i + 1], width, 1 / width, i * stride});
   }
   cells.back().high = std::numeric_limits<double>::infinity();  // ends every search
   const double low = nodes.front();
@@ -107,10 +107,10 @@ DisturbanceField::Axis::Axis(const std::vector<double>& nodes) {
   }
 }
 
-inline std::size_t DisturbanceField::Axis::cell_of(double value, double share) const {
-  std::size_t cell = buckets[static_cast<std::uint32_t>(share * kBuckets)];
-  while (cells[cell].high <= value) ++cell;
-  return cell;
+inline const DisturbanceField::Cell& DisturbanceField::Axis::cell_of(double value, double bucket) const {
+  const Cell* cell = &cells[buckets[static_cast<std::uint32_t>(bucket)]];
+  while (cell->high <= value) ++cell;
+  return *cell;
 }
 
 DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, double thrust_error,
@@ -129,8 +129,9 @@ DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, doub
   const std::vector<double> right(layers[0].y.begin() + static_cast<std::ptrdiff_t>(first),
                                   layers[0].y.end());
   const std::vector<double>& z = layers[0].z;
-  y_ = Axis(right);
-  z_ = Axis(z);
+  y_ = Axis(right, 1);
+  z_ = Axis(z, right.size());
+  columns_ = right.size();
   nodes_.resize(right.size() * z.size());
   for (std::size_t k = 0; k < layers.size(); ++k) {
     const auto f_y = layers[k].along_y(layers[k].value), f_z = layers[k].along_z(layers[k].value);
@@ -152,26 +153,25 @@ Disturbance DisturbanceField::at(double y_norm, double z_norm) const {
   if (nodes_.empty()) return {};
   // In this order NaN becomes a number, so that it never is an index.
   const double y = std::min(1.0, std::abs(y_norm)), z = std::max(-1.0, std::min(1.0, z_norm));
-  const std::size_t c = y_.cell_of(y, y), r = z_.cell_of(z, 0.5 * (z + 1));
-  const Cell& cell_y = y_.cells[c];
-  const Cell& cell_z = z_.cells[r];
+  const Cell& cell_y = y_.cell_of(y, kBuckets * y);
+  const Cell& cell_z = z_.cell_of(z, kBuckets / 2 * (z + 1));
   const Basis by((y - cell_y.low) * cell_y.per_width, cell_y.width);
   const Basis bz((z - cell_z.low) * cell_z.per_width, cell_z.width);
-  const std::size_t columns = y_.cells.size() + 1;
-  const Node* low = &nodes_[r * columns + c];
-  const Node* high = low + columns;
+  const Node* low = &nodes_[cell_z.first_node + cell_y.first_node];
+  const Node* high = low + columns_;
   double value[2];
   for (std::size_t k = 0; k < 2; ++k) {
+    // Sums in pairs: they wait for each other no longer than they must.
     const auto across = [&](const Node* row) {
-      return by.low * row[0].f[k] + by.low_slope * row[0].f_y[k] + by.high * row[1].f[k] +
-             by.high_slope * row[1].f_y[k];
+      return (by.low * row[0].f[k] + by.low_slope * row[0].f_y[k]) +
+             (by.high * row[1].f[k] + by.high_slope * row[1].f_y[k]);
     };
     const auto across_slope = [&](const Node* row) {
-      return by.low * row[0].f_z[k] + by.low_slope * row[0].f_yz[k] + by.high * row[1].f_z[k] +
-             by.high_slope * row[1].f_yz[k];
+      return (by.low * row[0].f_z[k] + by.low_slope * row[0].f_yz[k]) +
+             (by.high * row[1].f_z[k] + by.high_slope * row[1].f_yz[k]);
     };
-    value[k] = bz.low * across(low) + bz.low_slope * across_slope(low) + bz.high * across(high) +
-               bz.high_slope * across_slope(high);
+    value[k] = (bz.low * across(low) + bz.low_slope * across_slope(low)) +
+               (bz.high * across(high) + bz.high_slope * across_slope(high));
   }
   return {value[0], y_norm < 0 ? -value[1] : value[1]};
 }

@@ -46,6 +46,7 @@ class DisturbanceField {
 
   struct Cell {
     double low, high, width, per_width;
+    std::size_t first_node;  // the number of nodes before it
   };
 
   /// The cells between an axis's nodes, and where to begin the search for one.
@@ -54,13 +55,15 @@ class DisturbanceField {
     std::vector<std::uint32_t> buckets;  // for equal parts of [low, 1], the cell of its lower end
 
     Axis() = default;
-    explicit Axis(const std::vector<double>& nodes);
+    /// Neighbours on the axis are `stride` nodes apart.
+    Axis(const std::vector<double>& nodes, std::size_t stride);
 
-    /// `share` of [low, 1] is where `value` lies, which is on the axis.
-    std::size_t cell_of(double value, double share) const;
+    /// `bucket` is where `value`, which is on the axis, lies among the buckets.
+    const Cell& cell_of(double value, double bucket) const;
   };
 
-  Axis y_, z_;               // y_ from 0 to 1
+  Axis y_, z_;  // y_ from 0 to 1
+  std::size_t columns_ = 0;
   std::vector<Node> nodes_;  // row by row, rows follow z
 };
 

@@ -1,5 +1,7 @@
 #include "flight/vehicle/rigid_body.h"
 
+#include "flight/vehicle/quick_angles.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -84,9 +86,9 @@ void rk4_step(RigidState& state, const BodyConstants& body, const StepLoads& loa
 }
 
 EulerAngles euler_angles(const std::array<double, 4>& q) {
-  return {std::atan2(2 * (q[0] * q[1] + q[2] * q[3]), 1 - 2 * (q[1] * q[1] + q[2] * q[2])),
-          std::asin(std::clamp(2 * (q[0] * q[2] - q[3] * q[1]), -1.0, 1.0)),
-          std::atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]))};
+  return {quick_atan2(2 * (q[0] * q[1] + q[2] * q[3]), 1 - 2 * (q[1] * q[1] + q[2] * q[2])),
+          quick_asin(std::clamp(2 * (q[0] * q[2] - q[3] * q[1]), -1.0, 1.0)),
+          quick_atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]))};
 }
 
 std::array<double, 4> attitude_from(const EulerAngles& a) {

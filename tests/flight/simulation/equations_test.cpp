@@ -4,6 +4,7 @@
 #include "flight/vehicle/contact.h"
 #include "flight/vehicle/disturbance_field.h"
 #include "flight/vehicle/motors.h"
+#include "flight/vehicle/quick_angles.h"
 #include "flight/vehicle/random.h"
 #include "flight/vehicle/rigid_body.h"
 #include "support/seeds.h"
@@ -141,6 +142,18 @@ TEST(Random, HasTheMomentsOfANormalAndRepeats) {
   EXPECT_NEAR(fourth / kDraws, 3, 0.06);
   EXPECT_NEAR(beyond / double{kDraws}, 0.0027, 0.0004);
   EXPECT_NE(Random(5, 1).bits(), other.bits());
+}
+
+TEST(QuickAngles, AgreeWithTheLibraryOnBothSidesOfTheirLimits) {
+  for (int i = -1000; i <= 1000; ++i) {
+    const double x = 1e-3 * i;
+    EXPECT_NEAR(quick_asin(x), std::asin(x), 2e-12) << x;
+    EXPECT_NEAR(quick_atan(2 * x), std::atan(2 * x), 1e-13) << x;
+    const double angle = 3.14 * x;
+    EXPECT_NEAR(quick_atan2(0.7 * std::sin(angle), 0.7 * std::cos(angle)), angle, 1e-13);
+  }
+  EXPECT_EQ(quick_atan2(0, 0), 0);
+  EXPECT_TRUE(std::isnan(quick_atan2(NAN, 1)));
 }
 
 }  // namespace
