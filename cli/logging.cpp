@@ -1,8 +1,12 @@
 #include "cli/logging.h"
 
+#include "analysis/campaign_data.h"
 #include "analysis/run_summary.h"
 #include "cli/console.h"
+#include "cli/live/book.h"
+#include "cli/live/run_alarms.h"
 #include "datasets/error.h"
+#include "datasets/run_marks.h"
 
 #include <algorithm>
 #include <chrono>
@@ -94,8 +98,17 @@ int Logging::record(const PlannedRun& planned, const std::string& note, const Lo
         },
         stop_requested);
   }
-  if (watch.ended) watch.ended(name, outcome);
+  if (watch.ended)
+    watch.ended(name, outcome);
+  else
+    mark_alarms(file_, name, alarms(planned.session, outcome));
   return report(name, planned, outcome);
+}
+
+/// What a page would have marked the run with, as far as its frames tell.
+std::string Logging::alarms(const std::string& session, const LogOutcome& outcome) const {
+  const live::CellKnowledge cells = live::cells_of(read_campaign_data(file_));
+  return live::alarms_of(outcome, live::scale_of(cells, info_, session), info_, "");
 }
 
 double Logging::pace() const {

@@ -75,6 +75,7 @@ class Logging {
 
  private:
   double pace() const;
+  std::string alarms(const std::string& session, const LogOutcome& outcome) const;
   void add_conditions(const std::optional<InstrumentReadings>& shown, RunKind kind);
   std::string means_text(const std::array<double, 4>& volts) const;
   void show(ProgressBar& bar, const LogProgress& progress) const;

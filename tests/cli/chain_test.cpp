@@ -139,6 +139,7 @@ TEST_F(Chain, LossesAreSaidAndExitWithOne) {
   const ProgramResult doctor = run("doctor --db c.db");
   EXPECT_EQ(doctor.code, 1);
   EXPECT_THAT(doctor.out, HasSubstr("more than 1 % of the frames lost in R0001"));
+  EXPECT_THAT(doctor.out, HasSubstr("while recording: R0001 (loss)"));
 }
 
 TEST_F(Chain, JsonForMachines) {

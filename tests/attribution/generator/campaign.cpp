@@ -3,6 +3,8 @@
 #include "attribution/effects/catalogue.h"
 #include "datasets/error.h"
 
+#include <algorithm>
+
 namespace tunnelrig::attribution {
 namespace {
 
@@ -24,14 +26,13 @@ void check(const Settings& settings) {
 }
 
 /// An effect that the coefficients of the locations absorb takes absurd amplitudes to leave anything behind.
-void reject_hidden(const Sized& sized, const World& world) {
+bool is_hidden(const Sized& sized, const World& world) {
   for (std::size_t run = 0; run < world.runs.size(); ++run) {
     for (std::size_t rotor = 0; rotor < kRotors; ++rotor) {
-      if (std::abs(change_at(sized.effect, {world, run, rotor}, sized.amplitude)) < 0.5) continue;
-      throw InputError(fmt::format(
-          "--effect {}: this design cannot show it, coefficients of locations absorb it", sized.effect.name));
+      if (!(std::abs(change_at(sized.effect, {world, run, rotor}, sized.amplitude)) < 0.5)) return true;
     }
   }
+  return false;
 }
 
 /// Each truth with its amplitude. Known physics goes first, since it may change covariates and noise.
@@ -50,9 +51,35 @@ std::vector<Sized> size_effects(Campaign& campaign) {
     sized.push_back(
         give_size(std::move(effect), campaign.settings, campaign.world, campaign.noise, campaign.open_space));
   }
-  for (const Sized& one : sized) reject_hidden(one, campaign.world);
-  for (Sized& one : sized) measure(one, campaign.world, campaign.noise, campaign.open_space);
   return sized;
+}
+
+/// Truth, design, world and effects of an attempt.
+void draw_effects(Campaign& campaign, int attempt) {
+  const Settings& settings = campaign.settings;
+  campaign.truth = draw_truth(settings, attempt);
+  campaign.open_space = campaign.truth.design.places == Design::Places::kOpenSpace;
+  campaign.world = plan_world(settings, campaign.truth.design);
+  campaign.noise = draw_noise_model(settings);
+  campaign.effects = size_effects(campaign);
+}
+
+/// The attempt whose effects show. A small campaign may hide one that was drawn, and another is drawn; one
+/// that was asked for is refused. Runs that are added later to separate effects do not change the choice.
+int attempt_that_shows(Settings settings) {
+  constexpr int kAttempts = 20;
+  settings.separating.clear();
+  for (int attempt = 0;; ++attempt) {
+    Campaign campaign{.settings = settings};
+    draw_effects(campaign, attempt);
+    const auto hidden = std::find_if(campaign.effects.begin(), campaign.effects.end(),
+                                     [&](const Sized& one) { return is_hidden(one, campaign.world); });
+    if (hidden == campaign.effects.end()) return attempt;
+    if (!settings.effects.empty() || attempt + 1 == kAttempts)
+      throw InputError(
+          fmt::format("--effect {}: this design cannot show it, coefficients of locations absorb it",
+                      hidden->effect.name));
+  }
 }
 
 }  // namespace
@@ -69,11 +96,9 @@ double reading_over_baseline(const Campaign& campaign, std::size_t run, std::siz
 
 Campaign generate(const Settings& settings) {
   check(settings);
-  Campaign campaign{.settings = settings, .truth = draw_truth(settings)};
-  campaign.open_space = campaign.truth.design.places == Design::Places::kOpenSpace;
-  campaign.world = plan_world(settings, campaign.truth.design);
-  campaign.noise = draw_noise_model(settings);
-  campaign.effects = size_effects(campaign);
+  Campaign campaign{.settings = settings};
+  draw_effects(campaign, attempt_that_shows(settings));
+  for (Sized& one : campaign.effects) measure(one, campaign.world, campaign.noise, campaign.open_space);
   campaign.floor = noise_floor(campaign.noise, campaign.world);
   campaign.scatter = draw_noise(campaign.noise, campaign.world, settings.seed);
   for (std::size_t run = 0; run < campaign.world.runs.size(); ++run) {

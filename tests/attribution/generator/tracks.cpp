@@ -172,8 +172,8 @@ Truth draw_none(Random& random) {
 
 }  // namespace
 
-Truth draw_truth(const Settings& settings) {
-  Random random(settings.seed, "truth");
+Truth draw_truth(const Settings& settings, int attempt) {
+  Random random(settings.seed, attempt == 0 ? "truth" : fmt::format("truth, attempt {}", attempt));
   switch (settings.track) {
     case Track::kNone:
       if (!settings.effects.empty()) throw InputError("--track none: has no effect; leave --effect out");

@@ -16,7 +16,7 @@ struct Truth {
 };
 
 /// The truth of a track, drawn with `settings.seed`, or `settings.effects` where they are given.
-/// Throws InputError where the track has no such effect.
-Truth draw_truth(const Settings& settings);
+/// Each attempt draws another one. Throws InputError where the track has no such effect.
+Truth draw_truth(const Settings& settings, int attempt = 0);
 
 }  // namespace tunnelrig::attribution
