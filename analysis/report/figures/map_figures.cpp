@@ -12,7 +12,7 @@ namespace {
 constexpr int kPrintedNodes = 241;
 constexpr int kPrintedLevels = 9, kPrintedUncertaintyLevels = 4;
 
-constexpr double kLeft_mm = 13, kRight_mm = 17.5, kBottom_mm = 10, kTop_mm = 3;  // around the field
+constexpr double kLeft_mm = 14.2, kRight_mm = 17.5, kBottom_mm = 10, kTop_mm = 3;  // around the field
 
 struct MapTexts {
   const char *name, *symbol, *caption;
@@ -41,7 +41,7 @@ Figure drawn_map(const Picture& picture, const std::string& name, const std::str
   const DrawnPicture drawn = draw_picture(picture, frame_of(sheet));
   const double side_mm = width_mm - kLeft_mm - kRight_mm;
   const std::string axes = sheet.axes({kLeft_mm, kLeft_mm + side_mm, kBottom_mm, kBottom_mm + side_mm},
-                                      "← wall    ȳ [–]    wall →", "← ground    z̄ [–]    ceiling →", 10);
+                                      "← wall    ȳ [–]    wall →", "← ground    z̄ [–]    ceiling →", 11.2);
   const std::string small = fmt::format(
       "set tics font ',{0}' scale 0.5\nset border linewidth 0.5\nset cbtics scale 0.4 offset -0.6,0\nset "
       "xtics offset 0,0.3\n"

@@ -1,5 +1,6 @@
 #include "analysis/report/figures/sheet.h"
 
+#include "analysis/report/figures/embedded_font.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -80,8 +81,8 @@ std::string terminal(const Sheet& sheet, FigureFormat format, const std::string&
   }
   if (format == FigureFormat::kSvg) {
     // A unit is a point: sizes of fonts that a script names are not scaled.
-    return fmt::format("set terminal svg size {} font 'sans-serif,{}' linewidth 0.5 background 'white'",
-                       units(72), kFont_pt) +
+    return fmt::format("set terminal svg size {} font {} linewidth 0.5 background 'white'", units(72),
+                       gnuplot_text(fmt::format("{},{}", figure_font_family(), kFont_pt))) +
            output;
   }
   constexpr double kDot = kFigureDotsPerInch / 72.0;
@@ -152,6 +153,7 @@ std::string with_size(std::string file, const Sheet& sheet, FigureFormat format)
     const auto to = file.find('\n', from);
     file.replace(from, to - from,
                  fmt::format(" width=\"{:g}mm\" height=\"{:g}mm\"", sheet.width_mm, sheet.height_mm));
+    return with_embedded_font(std::move(file));
   }
   return file;
 }

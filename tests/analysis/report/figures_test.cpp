@@ -104,6 +104,22 @@ void expect_embedded_fonts(const std::string& pdf, const std::filesystem::path& 
   EXPECT_EQ(occurrences(pdf, "/FontFile"), fonts) << file;
 }
 
+/// Every text is in the family that the style element brings along.
+void expect_embedded_font(const std::string& svg, const std::filesystem::path& file) {
+  const std::string start = "@font-face { font-family: \"";
+  const auto family_at = svg.find(start);
+  ASSERT_NE(family_at, std::string::npos) << file;
+  const auto from = family_at + start.size();
+  const std::string family = svg.substr(from, svg.find('"', from) - from);
+  EXPECT_GT(occurrences(svg, "<text"), 0u) << file;
+  EXPECT_EQ(occurrences(svg, "font-family=\""), occurrences(svg, "font-family=\"" + family + "\"")) << file;
+  // TrueType or CFF by the first four bytes, and more than the tables alone.
+  const std::string data = "url(data:font/ttf;base64,";
+  const auto font_at = svg.find(data) + data.size();
+  EXPECT_THAT(svg.substr(font_at, 5), testing::AnyOf("AAEAA", "T1RUT")) << file;
+  EXPECT_GT(svg.find(')', font_at) - font_at, 10000u) << file;
+}
+
 /// 600 an inch, said in the chunk behind the header, whose sum another program checks.
 void expect_dots(const std::string& png, const std::filesystem::path& file) {
   EXPECT_EQ(big_endian(png.substr(16)), std::round(84 / 25.4 * kFigureDotsPerInch)) << file;
@@ -135,6 +151,7 @@ TEST_F(DrawnFiguresTest, EveryFormatHasTheWidthAskedForAndAllFigures) {
       EXPECT_NEAR(width_mm_of(text, format), width_mm, 0.2) << file;
       EXPECT_GT(text.size(), 3000u) << file;
       if (format == FigureFormat::kPdf) expect_embedded_fonts(text, file);
+      if (format == FigureFormat::kSvg) expect_embedded_font(text, file);
       if (format == FigureFormat::kPng) expect_dots(text, file);
     }
   }
