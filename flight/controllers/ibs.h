@@ -44,7 +44,7 @@ class Ibs {
       const double error = in.reference.position_m[i] - in.position_m[i];
       const double error_rate = in.reference.velocity_m_s[i] - in.velocity_m_s[i];
       beta_[i] += error * in.step_s;
-      // Divided only where it is reached: a division costs as much as the rest of the step.
+      // Divided only where it is reached: divisions are most of what a step costs.
       if (std::abs(law.integral * beta_[i]) > gains_.integral_limit_m_s2)
         beta_[i] = std::copysign(gains_.integral_limit_m_s2 / law.integral, beta_[i]);
       wanted[i] = in.reference.acceleration_m_s2[i] + gains_.lead_s * in.reference.jerk_m_s3[i] +

@@ -93,13 +93,12 @@ struct Basis {
 
 }  // namespace
 
-DisturbanceField::Axis::Axis(const std::vector<double>& nodes, std::size_t stride) {
+DisturbanceField::Axis::Axis(const std::vector<double>& nodes, double low, std::size_t stride) {
   for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
     const double width = nodes[i + 1] - nodes[i];
     cells.push_back({nodes[i], nodes[i + 1], width, 1 / width, i * stride});
   }
   cells.back().high = std::numeric_limits<double>::infinity();  // ends every search
-  const double low = nodes.front();
   for (std::size_t b = 0; b <= kBuckets; ++b) {
     const double end = low + (1 - low) * static_cast<double>(b) / kBuckets;
     buckets.push_back(b > 0 ? buckets.back() : 0);
@@ -129,8 +128,8 @@ DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, doub
   const std::vector<double> right(layers[0].y.begin() + static_cast<std::ptrdiff_t>(first),
                                   layers[0].y.end());
   const std::vector<double>& z = layers[0].z;
-  y_ = Axis(right, 1);
-  z_ = Axis(z, right.size());
+  y_ = Axis(right, 0, 1);
+  z_ = Axis(z, -1, right.size());
   columns_ = right.size();
   nodes_.resize(right.size() * z.size());
   for (std::size_t k = 0; k < layers.size(); ++k) {

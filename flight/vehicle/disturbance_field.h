@@ -55,8 +55,8 @@ class DisturbanceField {
     std::vector<std::uint32_t> buckets;  // for equal parts of [low, 1], the cell of its lower end
 
     Axis() = default;
-    /// Neighbours on the axis are `stride` nodes apart.
-    Axis(const std::vector<double>& nodes, std::size_t stride);
+    /// Neighbours on the axis, which goes from `low` to 1, are `stride` nodes apart.
+    Axis(const std::vector<double>& nodes, double low, std::size_t stride);
 
     /// `bucket` is where `value`, which is on the axis, lies among the buckets.
     const Cell& cell_of(double value, double bucket) const;
