@@ -62,7 +62,7 @@ template <>
 char* append_samples<std::int16_t>(const std::byte* from, std::size_t columns, char* to) {
   static const std::vector<CountText> texts = make_count_texts();
   for (std::size_t c = 0; c < columns; ++c) {
-    std::uint16_t bits;
+    std::uint16_t bits = 0;
     std::memcpy(&bits, from + c * sizeof(bits), sizeof(bits));
     const CountText& count = texts[bits];
     std::memcpy(to, count.text.data(), count.text.size());  // kLongestCell leaves room behind the comma
