@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <future>
 #include <optional>
 #include <string>
 
@@ -19,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLines = 1 << 16;   // bytes that are passed on at a time
+constexpr std::size_t kLines = 1 << 20;   // bytes that are passed on at a time
 constexpr std::size_t kLongestCell = 32;  // of a number, with its comma
 
 std::string text_of(double value) { return std::isnan(value) ? std::string() : fmt::format("{}", value); }
@@ -107,23 +108,28 @@ class CsvWriter : public Writer {
         header += (columns_++ > 0 ? "," : "") + series.column_name(c);
     }
     file_->write(header + "\n");
+    begin_lines();
   }
 
   void block(const Block& block) override {
-    lines_.resize(kLines + columns_ * kLongestCell);
-    char* at = lines_.data();
+    char* at = end_;
     for (std::size_t frame = 0; frame < block.frames; ++frame) {
       for (std::size_t s = 0; s < series_.size(); ++s) {
         const std::size_t columns = series_[s].columns;
         at = appends_[s](block.series[s].data() + frame * series_[s].frame_size(), columns, at);
       }
       at[-1] = '\n';
-      if (at - lines_.data() > static_cast<std::ptrdiff_t>(kLines)) at = pass_on(at);
+      if (at - lines_.data() > static_cast<std::ptrdiff_t>(kLines)) {
+        pass_on(at);
+        at = end_;
+      }
     }
-    pass_on(at);
+    end_ = at;
   }
 
   void end() override {
+    pass_on(end_);
+    settle();
     file_->close();
     file_.reset();
   }
@@ -168,10 +174,22 @@ class CsvWriter : public Writer {
   }
 
  private:
-  /// Writes the lines that end at `end`; gives where the next one begins.
-  char* pass_on(const char* end) {
-    file_->write(std::string_view(lines_.data(), static_cast<std::size_t>(end - lines_.data())));
-    return lines_.data();
+  void begin_lines() {
+    lines_.resize(kLines + columns_ * kLongestCell);
+    end_ = lines_.data();
+  }
+
+  /// Writes the lines that end at `end` while the next ones are made, which takes about as long.
+  void pass_on(const char* end) {
+    settle();
+    written_.swap(lines_);
+    const std::string_view text(written_.data(), static_cast<std::size_t>(end - written_.data()));
+    writing_ = std::async(std::launch::async, [this, text] { file_->write(text); });
+    begin_lines();
+  }
+
+  void settle() {
+    if (writing_.valid()) writing_.get();
   }
 
   fs::path folder_;
@@ -179,7 +197,9 @@ class CsvWriter : public Writer {
   std::vector<Series> series_;
   std::size_t columns_ = 0;
   std::vector<Append> appends_;  // of each series
-  std::vector<char> lines_;
+  std::vector<char> lines_, written_;
+  char* end_ = nullptr;        // of the lines that are in lines_
+  std::future<void> writing_;  // of written_; the last member, so that it is waited for before the others go
 };
 
 }  // namespace
