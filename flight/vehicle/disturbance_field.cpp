@@ -153,7 +153,7 @@ Disturbance DisturbanceField::at(double y_norm, double z_norm) const {
   // In this order NaN becomes a number, so that it never is an index.
   const double y = std::min(1.0, std::abs(y_norm)), z = std::max(-1.0, std::min(1.0, z_norm));
   const Cell& cell_y = y_.cell_of(y, kBuckets * y);
-  const Cell& cell_z = z_.cell_of(z, kBuckets / 2 * (z + 1));
+  const Cell& cell_z = z_.cell_of(z, 0.5 * kBuckets * (z + 1));
   const Basis by((y - cell_y.low) * cell_y.per_width, cell_y.width);
   const Basis bz((z - cell_z.low) * cell_z.per_width, cell_z.width);
   const Node* low = &nodes_[cell_z.first_node + cell_y.first_node];
