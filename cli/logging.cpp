@@ -101,14 +101,17 @@ int Logging::record(const PlannedRun& planned, const std::string& note, const Lo
   if (watch.ended)
     watch.ended(name, outcome);
   else
-    mark_alarms(file_, name, alarms(planned.session, outcome));
+    mark_alarms(file_, name, alarms(planned, outcome));
   return report(name, planned, outcome);
 }
 
 /// What a page would have marked the run with, as far as its frames tell.
-std::string Logging::alarms(const std::string& session, const LogOutcome& outcome) const {
-  const live::CellKnowledge cells = live::cells_of(read_campaign_data(file_));
-  return live::alarms_of(outcome, live::scale_of(cells, info_, session), info_, "");
+std::string Logging::alarms(const PlannedRun& planned, const LogOutcome& outcome) {
+  // Newtons need the tares, which only a tare changes: the whole file is not read after every run.
+  if (certificate_ && (!cells_ || planned.kind == RunKind::kTare))
+    cells_ = live::cells_of(read_campaign_data(file_));
+  const live::Scale scale = live::scale_of(cells_.value_or(live::CellKnowledge()), info_, planned.session);
+  return live::alarms_of(outcome, scale, info_, "");
 }
 
 double Logging::pace() const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "calibration/certificate.h"
+#include "cli/live/scale.h"
 #include "cli/virtual_session.h"
 #include "daq/logger.h"
 #include "daq/run_plan.h"
@@ -75,7 +76,7 @@ class Logging {
 
  private:
   double pace() const;
-  std::string alarms(const std::string& session, const LogOutcome& outcome) const;
+  std::string alarms(const PlannedRun& planned, const LogOutcome& outcome);
   void add_conditions(const std::optional<InstrumentReadings>& shown, RunKind kind);
   std::string means_text(const std::array<double, 4>& volts) const;
   void show(ProgressBar& bar, const LogProgress& progress) const;
@@ -85,6 +86,7 @@ class Logging {
   CampaignFile file_;
   CampaignInfo info_;
   std::optional<Certificate> certificate_;
+  std::optional<live::CellKnowledge> cells_;  // of the alarms, once a run has ended
   std::optional<VirtualSession> virtual_;
   std::unique_ptr<PacketSource> source_;
   RunCells conditions_;
