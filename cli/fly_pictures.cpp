@@ -1,9 +1,9 @@
 #include "cli/fly_pictures.h"
 
+#include "analysis/maps/category_colours.h"
 #include "analysis/maps/gnuplot.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -11,12 +11,10 @@
 namespace tunnelrig::cli {
 namespace {
 
-/// Okabe and Ito's colours, which the colour-blind can tell apart, dark ones first.
-constexpr std::array kColours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"};
 /// So many controllers can be told apart in one picture.
-constexpr std::size_t kMost = kColours.size();
+constexpr std::size_t kMost = kCategoryColours.size();
 
-std::string style(std::size_t i) { return fmt::format("lc rgb '{}' lw 1.8", kColours[i % kMost]); }
+std::string style(std::size_t i) { return fmt::format("lc rgb '{}' lw 1.8", kCategoryColours[i % kMost]); }
 
 /// Inline data blocks: walls, reference, and one path per controller.
 std::string data_blocks(const FlownScenario& flown, const FlightTask& task, std::size_t shown) {

@@ -1,4 +1,5 @@
 // What figures have in common: colours, points, data.
+#include "analysis/maps/category_colours.h"
 #include "analysis/report/figures/figures.h"
 
 #include <algorithm>
@@ -10,8 +11,7 @@
 namespace tunnelrig::report {
 
 std::string category_colour(std::size_t i) {
-  constexpr std::array kColours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"};
-  return kColours[i % kColours.size()];
+  return kCategoryColours[i % kCategoryColours.size()];
 }
 
 std::string ordered_colour(std::size_t i, std::size_t n) {

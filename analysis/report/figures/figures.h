@@ -43,7 +43,7 @@ Figures residual_figures(const Material& material, double width_mm);
 /// flight_1_paths, flight_1_errors, …: of every scenario in flights.json. `flights` is a section.
 Figures flight_figures(const Json& flights, double width_mm);
 
-/// Okabe and Ito's colours, which the colour-blind can tell apart, dark ones first.
+/// Those of category_colours.h, again from the first after the last.
 std::string category_colour(std::size_t i);
 
 /// The i-th of n colours of an ordered set: plasma (van der Walt and Smith 2015) without its pale end.
