@@ -1,5 +1,5 @@
-// Arc sine and arc tangent by their series at the small angles where nearly all of a flight is, by the
-// library beyond: a third of the time.
+// Arc sine and arc tangent by their series at the small angles where nearly all of a flight is, which is
+// quicker; by the library beyond.
 #pragma once
 
 #include <cmath>

@@ -10,9 +10,7 @@
 
 namespace tunnelrig::report {
 
-std::string category_colour(std::size_t i) {
-  return kCategoryColours[i % kCategoryColours.size()];
-}
+std::string category_colour(std::size_t i) { return kCategoryColours[i % kCategoryColours.size()]; }
 
 std::string ordered_colour(std::size_t i, std::size_t n) {
   constexpr std::array kPlasma = {0x0d0887u, 0x41049du, 0x6a00a8u, 0x8f0da4u,

@@ -44,7 +44,7 @@ std::optional<FontFile> sans() {
                   static_cast<unsigned>(face)};
 }
 
-/// Looking through the fonts takes a tenth of a second the first time.
+/// Looked for once.
 const std::optional<FontFile>& figure_font() {
   static const std::optional<FontFile> font = sans();
   return font;
@@ -62,7 +62,7 @@ void add_characters(std::string_view svg, hb_set_t* characters) {
   }
 }
 
-/// The font with nothing but these glyphs; empty where its licence bits or its format do not let it.
+/// The font with nothing but these glyphs; empty where its file cannot be read or cut.
 std::string subset(const FontFile& font, std::string_view svg) {
   const Handle<hb_blob_t, hb_blob_destroy> file(hb_blob_create_from_file_or_fail(font.path.c_str()));
   const Handle<hb_subset_input_t, hb_subset_input_destroy> input(hb_subset_input_create_or_fail());

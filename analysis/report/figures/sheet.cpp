@@ -143,7 +143,7 @@ std::string gnuplot_text(std::string_view text) {
   return out + "'";
 }
 
-std::string with_size(std::string file, const Sheet& sheet, FigureFormat format) {
+std::string completed(std::string file, const Sheet& sheet, FigureFormat format) {
   if (format == FigureFormat::kPng) {
     constexpr std::size_t kHeaderEnd = 8 + 4 + 4 + 13 + 4;  // signature, and the chunk IHDR
     return file.insert(kHeaderEnd, dots_per_metre());

@@ -67,7 +67,8 @@ constexpr const char* kNextPanel = "unset label\nunset arrow\n";
 /// Text for gnuplot in single quotes, whatever it holds; to be drawn with `noenhanced` where it is a user's.
 std::string gnuplot_text(std::string_view text);
 
-/// What gnuplot cannot say itself: an SVG is so many millimetres wide, a PNG has so many dots per metre.
-std::string with_size(std::string file, const Sheet& sheet, FigureFormat format);
+/// A drawn file with what gnuplot cannot say itself: an SVG is so many millimetres wide and carries its font,
+/// a PNG has so many dots per metre.
+std::string completed(std::string file, const Sheet& sheet, FigureFormat format);
 
 }  // namespace tunnelrig::report

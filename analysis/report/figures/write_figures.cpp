@@ -76,7 +76,7 @@ WrittenFigures write_figures(const std::filesystem::path& folder, const Campaign
     throw InputError(fmt::format("figures cannot be drawn: {}", *failed));
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto path = staging.path() / names[i];
-    write_text(path, report::with_size(read_text(path), figures.drawn[i].sheet, settings.format));
+    write_text(path, report::completed(read_text(path), figures.drawn[i].sheet, settings.format));
   }
   write_text(staging.path() / kCaptions, captions(figures.drawn, report, settings));
   names.emplace_back(kCaptions);
