@@ -3,13 +3,14 @@
 #include "analysis/exports/writer.h"
 #include "datasets/csv.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <future>
-#include <optional>
+#include <memory>
 #include <string>
 
 #include <fmt/format.h>
@@ -92,35 +93,41 @@ Append append_of(Element element) {
   return nullptr;
 }
 
+/// How the samples of a series become text.
+struct SeriesText {
+  Append append;
+  std::size_t columns, frame_size;
+};
+
 class CsvWriter : public Writer {
  public:
   explicit CsvWriter(fs::path folder) : folder_(std::move(folder)) { fs::create_directory(folder_ / "raw"); }
 
   void begin(const Recording& recording) override {
-    series_ = recording.series;
-    file_.emplace(folder_ / "raw" / (recording.key + ".csv"));
+    file_ = std::make_shared<OutputFile>(folder_ / "raw" / (recording.key + ".csv"));
     std::string header;
     columns_ = 0;
-    appends_.clear();
-    for (const Series& series : series_) {
-      appends_.push_back(append_of(series.element));
+    series_.clear();
+    for (const Series& series : recording.series) {
+      series_.push_back({append_of(series.element), series.columns, series.frame_size()});
       for (std::size_t c = 0; c < series.columns; ++c)
         header += (columns_++ > 0 ? "," : "") + series.column_name(c);
     }
-    file_->write(header + "\n");
+    header += '\n';
     begin_lines();
+    end_ = std::copy(header.begin(), header.end(), end_);
   }
 
   void block(const Block& block) override {
     char* at = end_;
     for (std::size_t frame = 0; frame < block.frames; ++frame) {
       for (std::size_t s = 0; s < series_.size(); ++s) {
-        const std::size_t columns = series_[s].columns;
-        at = appends_[s](block.series[s].data() + frame * series_[s].frame_size(), columns, at);
+        const SeriesText& text = series_[s];
+        at = text.append(block.series[s].data() + frame * text.frame_size, text.columns, at);
       }
       at[-1] = '\n';
       if (at - lines_.data() > static_cast<std::ptrdiff_t>(kLines)) {
-        pass_on(at);
+        pass_on(at, false);
         at = end_;
       }
     }
@@ -128,9 +135,7 @@ class CsvWriter : public Writer {
   }
 
   void end() override {
-    pass_on(end_);
-    settle();
-    file_->close();
+    pass_on(end_, true);
     file_.reset();
   }
 
@@ -167,6 +172,7 @@ class CsvWriter : public Writer {
   }
 
   void finish(const std::vector<std::pair<std::string, std::string>>& provenance) override {
+    settle();
     nlohmann::ordered_json json;
     for (const auto& [key, text] : provenance) json[key] = text;
     write_file(folder_ / "provenance.json",
@@ -179,12 +185,16 @@ class CsvWriter : public Writer {
     end_ = lines_.data();
   }
 
-  /// Writes the lines that end at `end` while the next ones are made, which takes about as long.
-  void pass_on(const char* end) {
+  /// Writes the lines that end at `end`, the file's last ones or not, while the next are made, of this
+  /// recording or of the one after it: both take about as long.
+  void pass_on(const char* end, bool last) {
     settle();
     written_.swap(lines_);
     const std::string_view text(written_.data(), static_cast<std::size_t>(end - written_.data()));
-    writing_ = std::async(std::launch::async, [this, text] { file_->write(text); });
+    writing_ = std::async(std::launch::async, [file = file_, text, last] {
+      file->write(text);
+      if (last) file->close();
+    });
     begin_lines();
   }
 
@@ -193,10 +203,9 @@ class CsvWriter : public Writer {
   }
 
   fs::path folder_;
-  std::optional<OutputFile> file_;
-  std::vector<Series> series_;
+  std::shared_ptr<OutputFile> file_;
+  std::vector<SeriesText> series_;
   std::size_t columns_ = 0;
-  std::vector<Append> appends_;  // of each series
   std::vector<char> lines_, written_;
   char* end_ = nullptr;        // of the lines that are in lines_
   std::future<void> writing_;  // of written_; the last member, so that it is waited for before the others go
