@@ -96,6 +96,7 @@ FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, c
     task.localisation.reset();
   } else {
     task.localisation->lidar.range_sigma_m = 1e-3 * options.lidar_sigma_mm;
+    if (options.position == "lidar-thesis") task.localisation->filter = FlightFilter::thesis;
   }
   const std::string extrapolated = extrapolation(map.map.geometry, space, frame);
   if (!extrapolated.empty()) warn("extrapolated, in normalised coordinates: " + extrapolated);
@@ -157,8 +158,8 @@ int run_fly(const FlyOptions& given) {
   const Processes processes;
   const FlyOptions options = processes.rank() > 0 ? quiet_options(given) : given;
   options.hidden.validate();
-  if (options.position != "lidar" && options.position != "given")
-    throw InputError(fmt::format("--position {}: must be lidar or given", options.position));
+  if (options.position != "lidar" && options.position != "lidar-thesis" && options.position != "given")
+    throw InputError(fmt::format("--position {}: must be lidar, lidar-thesis or given", options.position));
   if (!options.tune.empty()) return tune_all(options);
   const NamedMap map = map_of(options);
   const GainTable gains =
@@ -210,7 +211,9 @@ void add_fly(CLI::App& app, Work& work) {
                    "Threads; 0 is one per core. The results do not depend on it")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
-  verb->add_option("--position", options->position, "lidar (scans, matcher, filter) or given (exact)")
+  verb->add_option(
+          "--position", options->position,
+          "lidar (scans, matcher, filter), lidar-thesis (the same with the thesis's filter) or given (exact)")
       ->capture_default_str();
   verb->add_option("--lidar-sigma-mm", options->lidar_sigma_mm, "Range noise of the LIDAR")
       ->check(CLI::Range(0.0, 500.0))

@@ -103,11 +103,16 @@ std::string comparison_csv(const FlownScenario& flown) {
   return text;
 }
 
+std::string position_of(const FlightTask& task) {
+  if (!task.localisation) return "given";
+  return task.localisation->filter == FlightFilter::thesis ? "lidar-thesis" : "lidar";
+}
+
 }  // namespace
 
 std::string flight_for_report(const FlownScenario& flown, const FlightTask& task, const std::string& map) {
   nlohmann::ordered_json json = scenario_json(flown, map, task.seed);
-  json["position"] = task.localisation ? "lidar" : "given";
+  json["position"] = position_of(task);
   json["walls"] = nlohmann::ordered_json::array();
   for (const auto& edge : task.space->walls.edges())
     json["walls"].push_back({rounded(edge.from[0]), rounded(edge.from[1])});

@@ -35,6 +35,21 @@ struct Belief {
   Eigen::Matrix<double, kStates, kStates> covariance = Eigen::Matrix<double, kStates, kStates>::Zero();
 };
 
+/// What a filter corrects itself by.
+struct MeasuredPosition {
+  Eigen::Vector2d position_m{0, 0};
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
+  double age_s = 0;  // time since it was measured
+  /// By how much it moves for each radian of the attitude's error; for models with that error as a state.
+  Eigen::Vector2d per_roll_m{0, 0};
+};
+
+/// A model one of whose states, number kRollError, is the error of the attitude's roll.
+template <typename Model>
+concept WithRollError = requires {
+  Model::kRollError;
+};
+
 /// The Model is a struct with kStates, a type Input with finite(), and step(belief, input, dt_s, last),
 /// `last` where the step is not only the first part of one that a correction divides. The position is its
 /// first two states.
@@ -69,8 +84,13 @@ class DelayedFilter {
   /// accepted correction.
   Correction correct(const Eigen::Vector2d& position_m, const Eigen::Matrix2d& covariance_m2,
                      double age_s = 0) {
-    check(position_m, covariance_m2, age_s);
-    if (age_s <= kInstant_s) return update(now_, position_m, covariance_m2);
+    return correct({position_m, covariance_m2, age_s});
+  }
+
+  Correction correct(const MeasuredPosition& measured) {
+    check(measured);
+    const double age_s = measured.age_s;
+    if (age_s <= kInstant_s) return update(now_, measured);
 
     std::size_t at = next_;  // the step in which the measurement was taken, and how far before its end
     double before_end_s = age_s;
@@ -82,7 +102,7 @@ class DelayedFilter {
     Belief<Model::kStates> then = divided.before;
     const double into_step_s = -before_end_s;
     if (into_step_s > kInstant_s) model_.step(then, divided.input, into_step_s, false);
-    Correction result = update(then, position_m, covariance_m2);
+    Correction result = update(then, measured);
     if (!result.accepted) return result;
 
     divided.before = then;
@@ -105,6 +125,7 @@ class DelayedFilter {
 
  private:
   static constexpr double kInstant_s = 1e-9;
+  using Gain = Eigen::Matrix<double, Model::kStates, 2>;
 
   struct Past {
     Belief<Model::kStates> before;
@@ -112,23 +133,38 @@ class DelayedFilter {
     double dt_s = 0;
   };
 
-  static void check(const Eigen::Vector2d& position_m, const Eigen::Matrix2d& covariance_m2, double age_s) {
-    if (!position_m.allFinite()) throw InputError::in("estimator", "a measured position is not finite");
-    const double determinant = covariance_m2.determinant();
-    if (!(covariance_m2(0, 0) > 0 && determinant > 0 && covariance_m2.allFinite()))
+  static void check(const MeasuredPosition& measured) {
+    if (!measured.position_m.allFinite() || !measured.per_roll_m.allFinite())
+      throw InputError::in("estimator", "a measured position is not finite");
+    const Eigen::Matrix2d& covariance = measured.covariance_m2;
+    if (!(covariance(0, 0) > 0 && covariance.determinant() > 0 && covariance.allFinite()))
       throw InputError::in("estimator", "the covariance of a measured position is not positive definite");
-    if (!(age_s >= 0))
-      throw InputError::in("estimator", "a position of {} s ago: ages are not negative", age_s);
+    if (!(measured.age_s >= 0))
+      throw InputError::in("estimator", "a position of {} s ago: ages are not negative", measured.age_s);
+  }
+
+  /// M Hᵀ, where H = [I 0], with `per_roll_m` in the column of the attitude's error.
+  static Gain seen(const Covariance& m, const MeasuredPosition& by) {
+    Gain result = m.template leftCols<2>();
+    if constexpr (WithRollError<Model>) result += m.col(Model::kRollError) * by.per_roll_m.transpose();
+    return result;
   }
 
   /// The gain's equation, (6.14), and (6.15) in Joseph's form, which stays positive definite whatever
   /// rounding does to the gain.
-  Correction update(Belief<Model::kStates>& belief, const Eigen::Vector2d& position_m,
-                    const Eigen::Matrix2d& covariance_m2) {
+  Correction update(Belief<Model::kStates>& belief, const MeasuredPosition& measured) {
     Covariance& p = belief.covariance;
     Correction result;
-    result.innovation_m = position_m - belief.state.template head<2>();
-    result.innovation_covariance_m2 = p.template topLeftCorner<2, 2>() + covariance_m2;
+    result.innovation_m = measured.position_m - belief.state.template head<2>();
+    if constexpr (WithRollError<Model>)
+      result.innovation_m -= measured.per_roll_m * belief.state(Model::kRollError);
+    const auto innovation_covariance = [&](const Gain& with_position) -> Eigen::Matrix2d {
+      Eigen::Matrix2d s = with_position.template topRows<2>() + measured.covariance_m2;
+      if constexpr (WithRollError<Model>) s += measured.per_roll_m * with_position.row(Model::kRollError);
+      return s;
+    };
+    Gain with_position = seen(p, measured);  // P Hᵀ
+    result.innovation_covariance_m2 = innovation_covariance(with_position);
     result.nis = result.innovation_m.dot(result.innovation_covariance_m2.inverse() * result.innovation_m);
     if (result.nis > gate_.sigma * gate_.sigma) {
       if (gate_.most_rejections == 0 || ++rejections_ <= gate_.most_rejections) return result;
@@ -138,21 +174,20 @@ class DelayedFilter {
       const double astray_s = std::max(since_accepted_s_, kLongest_step_s);
       p.template topLeftCorner<2, 2>() += square_m2 * Eigen::Matrix2d::Identity();
       p.template block<2, 2>(2, 2) += square_m2 / (astray_s * astray_s) * Eigen::Matrix2d::Identity();
-      result.innovation_covariance_m2 = p.template topLeftCorner<2, 2>() + covariance_m2;
+      with_position = seen(p, measured);
+      result.innovation_covariance_m2 = innovation_covariance(with_position);
       result.nis = result.innovation_m.dot(result.innovation_covariance_m2.inverse() * result.innovation_m);
     }
     rejections_ = 0;
     since_accepted_s_ = 0;
     result.accepted = true;
 
-    using Gain = Eigen::Matrix<double, Model::kStates, 2>;
-    const Gain with_position = p.template leftCols<2>();
     const Gain gain = with_position * result.innovation_covariance_m2.inverse();
     belief.state += gain * result.innovation_m;
-    // (I − KH) P (I − KH)ᵀ + K R Kᵀ, H = [I 0]
-    const Covariance left = p - gain * p.template topRows<2>();
+    // (I − KH) P (I − KH)ᵀ + K R Kᵀ
+    const Covariance left = p - gain * with_position.transpose();
     const Covariance both =
-        left - left.template leftCols<2>() * gain.transpose() + gain * covariance_m2 * gain.transpose();
+        left - seen(left, measured) * gain.transpose() + gain * measured.covariance_m2 * gain.transpose();
     p = 0.5 * (both + both.transpose());
     return result;
   }

@@ -1,5 +1,7 @@
 #include "flight/localisation/kalman_filter.h"
 
+#include "flight/vehicle/airframe.h"
+
 namespace tunnelrig {
 namespace {
 
@@ -10,6 +12,16 @@ Belief<4> kinematic_start(const Eigen::Vector2d& position_m, const StartSettings
   belief.state << position_m, 0, 0;
   belief.covariance.diagonal() << Eigen::Array2d::Constant(start.position_sigma_m).square(),
       Eigen::Array2d::Constant(start.velocity_sigma_m_s).square();
+  return belief;
+}
+
+Belief<7> inertial_start(const Eigen::Vector2d& position_m, const StartSettings& start) {
+  Belief<7> belief;
+  const Belief<4> kinematic = kinematic_start(position_m, start);
+  belief.state.head<4>() = kinematic.state;
+  belief.covariance.topLeftCorner<4, 4>() = kinematic.covariance;
+  belief.covariance.diagonal().tail<3>() << start.roll_sigma_rad * start.roll_sigma_rad,
+      Eigen::Array2d::Constant(start.bias_sigma_m_s2).square();
   return belief;
 }
 
@@ -41,6 +53,38 @@ void KinematicModel::step(Belief<kStates>& belief, const Input& input, double dt
   belief.covariance.topRightCorner<2, 2>() = new_pv;
   belief.covariance.bottomLeftCorner<2, 2>() = new_pv.transpose();
   belief.covariance.bottomRightCorner<2, 2>() += dt_s * dt_s * variance * unit;
+}
+
+void InertialModel::step(Belief<kStates>& belief, const Input& input, double dt_s, bool /*last*/) const {
+  auto& x = belief.state;
+  auto& p = belief.covariance;
+  const double half = 0.5 * dt_s * dt_s;
+  // measured = a + b + e (−g − a_z, a_y), to first order in e
+  const Eigen::Vector2d& measured = input.acceleration_m_s2;
+  const Eigen::Vector2d per_roll(kGravity_m_s2 + measured.y(), -measured.x());
+  const Eigen::Vector2d acceleration = measured + per_roll * x(kRollError) - x.tail<2>();
+  x.head<2>() += dt_s * x.segment<2>(2) + half * acceleration;
+  x.segment<2>(2) += dt_s * acceleration;
+
+  // F P Fᵀ, F = I + Δt E(p,v) + ½Δt² E(p,a) + Δt E(v,a), a = per_roll e − b: rows, then columns
+  const Eigen::Matrix<double, 2, kStates> rows = per_roll * p.row(kRollError) - p.bottomRows<2>();
+  p.topRows<2>() += dt_s * p.middleRows<2>(2) + half * rows;
+  p.middleRows<2>(2) += dt_s * rows;
+  const Eigen::Matrix<double, kStates, 2> columns =
+      p.col(kRollError) * per_roll.transpose() - p.rightCols<2>();
+  p.leftCols<2>() += dt_s * p.middleCols<2>(2) + half * columns;
+  p.middleCols<2>(2) += dt_s * columns;
+
+  const double variance = acceleration_variance_m2_s4 / (rate_hz * dt_s);
+  for (int axis = 0; axis < 2; ++axis) {
+    const int v = axis + 2;
+    p(axis, axis) += half * half * variance;
+    p(axis, v) += half * dt_s * variance;
+    p(v, axis) += half * dt_s * variance;
+    p(v, v) += dt_s * dt_s * variance;
+    p(axis + 5, axis + 5) += bias_density_m2_s5 * dt_s;
+  }
+  p(kRollError, kRollError) += roll_density_rad2_s * dt_s;
 }
 
 void AugmentedModel::step(Belief<kStates>& belief, const Input& input, double dt_s, bool last) const {
@@ -95,6 +139,10 @@ void AugmentedModel::step(Belief<kStates>& belief, const Input& input, double dt
 KalmanFilter::KalmanFilter(const Eigen::Vector2d& position_m, const KinematicModel& model,
                            const GateSettings& gate, const StartSettings& start)
     : DelayedFilter(model, kinematic_start(position_m, start), gate) {}
+
+InertialFilter::InertialFilter(const Eigen::Vector2d& position_m, const InertialModel& model,
+                               const GateSettings& gate, const StartSettings& start)
+    : DelayedFilter(model, inertial_start(position_m, start), gate) {}
 
 AugmentedFilter::AugmentedFilter(const Eigen::Vector2d& position_m, const AugmentedModel& model,
                                  const GateSettings& gate, const StartSettings& start)

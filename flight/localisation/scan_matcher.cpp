@@ -97,9 +97,15 @@ struct ScanMatcher::Work {
   const BeamKernels& kernels = beam_kernels();
   BeamArray arrays[10];
   Beams beams;
+  std::vector<Eigen::Vector2f> directions;  // in the scan plane, as laid out
+  double bent_beams = 0;                    // that a beam's direction is off its place in the layout, at most
   Eigen::Matrix2d attitude = Eigen::Matrix2d::Identity();  // the projection that the IMU gives
   int returned = 0;                                        // beams with a return
   std::vector<float> sizes_m;                              // of residuals, where their median is needed
+  // Of the last match, for moved_per_roll_m
+  Eigen::Matrix2d matched_projection = Eigen::Matrix2d::Identity();
+  SectionPoint matched{0, 0};
+  double matched_gate_m = 0;  // 0: nothing matched
 
   Work(const CrossSection& the_section, const MatcherSettings& the_settings)
       : settings(the_settings),
@@ -115,9 +121,45 @@ struct ScanMatcher::Work {
     beams.count = settings.layout.beams;
     beams.padded = arrays[0].padded();
     for (std::size_t i = 0; i < beams.count; ++i) {
-      beams.cosine[i] = static_cast<float>(std::cos(settings.layout.angle_rad(i)));
-      beams.sine[i] = static_cast<float>(std::sin(settings.layout.angle_rad(i)));
+      const double angle = settings.layout.angle_rad(i);
+      directions.emplace_back(static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)));
     }
+    point_as_laid_out();
+  }
+
+  void point_as_laid_out() {
+    for (std::size_t i = 0; i < beams.count; ++i) {
+      beams.cosine[i] = directions[i].x();
+      beams.sine[i] = directions[i].y();
+    }
+    bent_beams = 0;
+  }
+
+  /// The beams as they would be from the middle of the sweep to the points that they met.
+  void straighten(const SweepMotion& motion) {
+    if (bent_beams > 0) point_as_laid_out();
+    const Eigen::Vector2f travel =
+        (attitude.inverse() * motion.velocity_m_s * motion.sweep_s).cast<float>();  // in the scan plane
+    const auto turn_rad = static_cast<float>(motion.roll_rate_rad_s * motion.sweep_s);
+    if (travel.isZero(0) && turn_rad == 0) return;
+    float nearest = static_cast<float>(settings.most_range_m);
+    const float each = 1 / static_cast<float>(beams.count - 1);
+    for (std::size_t i = 0; i < beams.count; ++i) {
+      if (!(beams.range[i] > 0)) continue;
+      nearest = std::min(nearest, beams.range[i]);
+      const float at = each * static_cast<float>(i) - 0.5F;
+      // sin and cos of so small an angle
+      const float sine = at * turn_rad, cosine = 1 - 0.5F * sine * sine;
+      const Eigen::Vector2f& d = directions[i];
+      const Eigen::Vector2f end =
+          beams.range[i] * Eigen::Vector2f(cosine * d.x() - sine * d.y(), sine * d.x() + cosine * d.y()) +
+          at * travel;
+      beams.range[i] = end.norm();
+      beams.cosine[i] = end.x() / beams.range[i];
+      beams.sine[i] = end.y() / beams.range[i];
+    }
+    bent_beams =
+        0.5 * static_cast<double>(std::abs(turn_rad) + travel.norm() / nearest) / settings.layout.step_rad;
   }
 
   int unknowns() const {
@@ -194,7 +236,7 @@ struct ScanMatcher::Work {
   double step(Fit& fit, double& gate_m, bool turned) {
     const Eigen::Matrix2d now = projection(fit.pose);
     if (turned) kernels.project(beams, narrowed(now));
-    walls.look(kernels, beams, now, fit.pose.position);
+    walls.look(kernels, beams, now, fit.pose.position, bent_beams);
     FitSums sums;
     const int size = unknowns();
     kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), static_cast<float>(settings.most_slope),
@@ -324,13 +366,16 @@ struct ScanMatcher::Work {
     return Rejection::none;
   }
 
-  void take(const Scan& scan, const Attitude& imu) {
+  void take(const Scan& scan, const Attitude& imu, const SweepMotion& motion) {
     if (scan.range_m.empty()) throw InputError::in("scan", "it is empty");
     if (scan.range_m.size() != beams.count)
       throw InputError::in("scan", "{} beams: the matcher was set up for {}", scan.range_m.size(),
                            beams.count);
     if (!std::isfinite(imu.roll_rad) || !std::isfinite(imu.pitch_rad) || !std::isfinite(imu.yaw_rad))
       throw InputError::in("scan", "its attitude is not finite");
+    if (!motion.velocity_m_s.allFinite() || !std::isfinite(motion.roll_rate_rad_s) ||
+        !std::isfinite(motion.sweep_s))
+      throw InputError::in("scan", "the motion during its sweep is not finite");
     attitude = section_projection(imu);
     if (!(attitude.determinant() >= kMost_tilt_cosine))
       throw InputError::in("scan",
@@ -343,6 +388,26 @@ struct ScanMatcher::Work {
           std::find_if(scan.range_m.begin(), scan.range_m.end(), [](float r) { return r != r; });
       throw InputError::in("scan", "beam {} is not a number", wrong - scan.range_m.begin());
     }
+    straighten(motion);
+  }
+
+  void remember(const Fit& fit) {
+    matched_projection = projection(fit.pose);
+    matched = fit.pose.position;
+    matched_gate_m = fit.solved ? settings.gate_sigma * std::max(fit.residual_m, settings.least_sigma_m) : 0;
+  }
+
+  /// Least squares for the position at a roll that is too large by a little: −(JₚᵀJₚ)⁻¹ Jₚᵀ Jᵣ, r the
+  /// rotation.
+  Eigen::Vector2d moved_per_roll_m() {
+    if (matched_gate_m == 0) return {0, 0};
+    walls.look(kernels, beams, matched_projection, matched, bent_beams);
+    FitSums sums;
+    kernels.fit(beams, narrowed(matched_projection), static_cast<float>(matched_gate_m),
+                static_cast<float>(settings.most_slope), 3, sums);
+    Eigen::Matrix2d normal;
+    normal << sums.normal[0][0], sums.normal[1][0], sums.normal[1][0], sums.normal[1][1];
+    return -(normal.inverse() * Eigen::Vector2d(sums.normal[2][0], sums.normal[2][1]));
   }
 
   Match result(const Fit& fit, const Attitude& imu) const {
@@ -373,12 +438,14 @@ ScanMatcher::~ScanMatcher() = default;
 ScanMatcher::ScanMatcher(ScanMatcher&&) noexcept = default;
 ScanMatcher& ScanMatcher::operator=(ScanMatcher&&) noexcept = default;
 
+Eigen::Vector2d ScanMatcher::moved_per_roll_m() const { return work_->moved_per_roll_m(); }
+
 const MatcherSettings& ScanMatcher::settings() const { return work_->settings; }
 
 Match ScanMatcher::match(const Scan& scan, const Attitude& attitude,
-                         const std::optional<Eigen::Vector2d>& prior) {
+                         const std::optional<Eigen::Vector2d>& prior, const SweepMotion& motion) {
   Work& work = *work_;
-  work.take(scan, attitude);
+  work.take(scan, attitude, motion);
   if (prior && !prior->allFinite()) throw InputError::in("scan", "its prior is not finite");
   Fit fit;
   Rejection reason = Rejection::few_beams;
@@ -391,6 +458,7 @@ Match ScanMatcher::match(const Scan& scan, const Attitude& attitude,
     if (reason != Rejection::none || found.rivalry > work.settings.ambiguity)
       reason = work.choose(where, rotation, fit);
   }
+  work.remember(fit);
   Match match = work.result(fit, attitude);
   match.reason = reason;
   match.accepted = reason == Rejection::none;

@@ -69,6 +69,13 @@ enum class Rejection { none, few_beams, poor_fit, noisy, unobservable, ambiguous
 /// "too few beams" …, for logs and messages.
 std::string_view text(Rejection reason);
 
+/// How the LIDAR moves while it sweeps: steadily, from the first beam to the last.
+struct SweepMotion {
+  double sweep_s = 0;
+  Eigen::Vector2d velocity_m_s{0, 0};  // in the cross-section
+  double roll_rate_rad_s = 0;
+};
+
 struct Match {
   Eigen::Vector2d position_m{0, 0};  // (y, z) of the LIDAR in the cross-section
   double rotation_rad = 0;  // what is to be added to the attitude's roll; 0 where it is taken as known
@@ -91,12 +98,18 @@ class ScanMatcher {
   ScanMatcher(ScanMatcher&&) noexcept;
   ScanMatcher& operator=(ScanMatcher&&) noexcept;
 
-  /// The attitude is the IMU's when the scan was taken. A prior narrows the search and is not otherwise used.
-  /// Throws InputError for an empty scan, one with another number of beams, NaN, or an attitude that is not
-  /// finite or turns the scan plane edge-on (over 75°); everything else that is wrong with a scan is a
-  /// rejection.
+  /// The attitude is the IMU's in the middle of the sweep, and the position is that of the same moment. A
+  /// prior narrows the search and is not otherwise used; with a motion every beam counts from where it was
+  /// measured. Throws InputError for an empty scan, one with another number of beams, NaN, an attitude or
+  /// motion that is not finite, or an attitude that turns the scan plane edge-on (over 75°); everything else
+  /// that is wrong with a scan is a rejection.
   Match match(const Scan& scan, const Attitude& attitude,
-              const std::optional<Eigen::Vector2d>& prior = std::nullopt);
+              const std::optional<Eigen::Vector2d>& prior = std::nullopt, const SweepMotion& motion = {});
+
+  /// By how much the position of the last match moves for each radian that the attitude's roll was too large,
+  /// m. The scan turns about the LIDAR, so that a match far from the middle of the walls in sight moves more.
+  /// Zero where nothing matched.
+  Eigen::Vector2d moved_per_roll_m() const;
 
   const MatcherSettings& settings() const;
 

@@ -27,7 +27,7 @@ VisibleWalls::VisibleWalls(const CrossSection& section, const BeamLayout& layout
 }
 
 void VisibleWalls::look(const BeamKernels& kernels, const Beams& beams, const Eigen::Matrix2d& projection,
-                        const SectionPoint& from) {
+                        const SectionPoint& from, double bent_beams) {
   std::fill_n(beams.inverse, beams.padded, 0.0F);
 
   // Seen from the scan plane, where the beams are evenly spread, the section is an affine picture of itself.
@@ -37,10 +37,11 @@ void VisibleWalls::look(const BeamKernels& kernels, const Beams& beams, const Ei
     const double beam = (std::atan2(at.y(), at.x()) - layout_.first_rad) / layout_.step_rad;
     seen_at_[i] = beam - full_turn_ * std::floor(beam / full_turn_);
   }
+  const double slack = bent_beams + kSlack_beams;
   const auto see = [&](double first, double last, float wall_y, float wall_z) {
     const double most = static_cast<double>(beams.count);
-    const double start = std::clamp(std::ceil(first - kSlack_beams), 0.0, most);
-    const double end = std::clamp(std::floor(last + kSlack_beams) + 1, 0.0, most);
+    const double start = std::clamp(std::ceil(first - slack), 0.0, most);
+    const double end = std::clamp(std::floor(last + slack) + 1, 0.0, most);
     if (start < end)
       kernels.see(beams, static_cast<std::size_t>(start), static_cast<std::size_t>(end), wall_y, wall_z);
   };

@@ -18,9 +18,9 @@ class VisibleWalls {
   VisibleWalls(const CrossSection& section, const BeamLayout& layout);
 
   /// Fills inverse and, where that is not 0, wall_y and wall_z of beams whose directions have been projected
-  /// with the same `projection`.
+  /// with the same `projection`, and are off their places in the layout by at most `bent_beams`.
   void look(const BeamKernels& kernels, const Beams& beams, const Eigen::Matrix2d& projection,
-            const SectionPoint& from);
+            const SectionPoint& from, double bent_beams);
 
  private:
   struct Edge {

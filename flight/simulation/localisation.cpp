@@ -25,7 +25,8 @@ Localisation::Localisation(const FlightSpace& space, const LocalisationSettings&
     : floor_m_(space.floor_m),
       settings_(settings),
       section_(&space.tunnel.section),
-      matcher_(space.tunnel.section, matcher_settings(space.tunnel, settings.lidar)) {}
+      matcher_(space.tunnel.section, matcher_settings(space.tunnel, settings.lidar)),
+      filter_(InertialFilter({0, 0})) {}
 
 void Localisation::prepare(std::uint64_t seed, std::uint64_t stream) {
   lidar_.emplace(*section_, settings_.lidar, Random(seed, 4 * stream + 3).bits());
@@ -33,8 +34,12 @@ void Localisation::prepare(std::uint64_t seed, std::uint64_t stream) {
 
 void Localisation::start(const RigidState& truth) {
   if (!lidar_) prepare(0, 0);
-  filter_.emplace(Eigen::Vector2d(truth.position_m[1], truth.position_m[2] + floor_m_), settings_.model,
-                  settings_.gate);
+  const Eigen::Vector2d at(truth.position_m[1], truth.position_m[2] + floor_m_);
+  if (settings_.filter == FlightFilter::inertial) {
+    filter_ = InertialFilter(at, settings_.inertial, settings_.gate, settings_.start);
+  } else {
+    filter_ = KalmanFilter(at, settings_.kinematic, settings_.gate, settings_.start);
+  }
   cycle_ = nees_count_ = 0;
   matches_ = rejected_ = 0;
   nees_sum_ = 0;
@@ -48,44 +53,74 @@ PlanarEstimate Localisation::step(const EstimatorInput& in) {
       {{truth.position_m[1], truth.position_m[2] + floor_m_},
        {true_angles.roll_rad, true_angles.pitch_rad, true_angles.yaw_rad}},
       {in.attitude.roll_rad, in.attitude.pitch_rad, in.attitude.yaw_rad}};
-  if (cycle_ > 0) filter_->predict({in.acceleration_m_s2[0], in.acceleration_m_s2[1]}, kControlStep_s);
+  if (cycle_ > 0) {
+    const Eigen::Vector2d acceleration(in.acceleration_m_s2[0], in.acceleration_m_s2[1]);
+    std::visit([&](auto& filter) { filter.predict(acceleration, kControlStep_s); }, filter_);
+  }
   const long phase = cycle_ % settings_.cycles_per_scan;
   if (cycle_ >= settings_.cycles_per_scan && phase == 0) take_scan();
   if (waiting_ && phase == settings_.cycles_of_latency) correct();
   ++cycle_;
   judge(truth);
-  const Eigen::Vector2d position = filter_->position_m(), velocity = filter_->velocity_m_s();
-  return {{position.x(), position.y() - floor_m_}, {velocity.x(), velocity.y()}};
+  const Eigen::Vector4d state = kinematic_state();
+  return {{state[0], state[1] - floor_m_}, {state[2], state[3]}};
+}
+
+/// As it was between two cycles.
+Localisation::Moment Localisation::moment_ago(double ago_s) const {
+  const double cycles = ago_s * kControlRate_Hz;
+  const auto whole = static_cast<long>(cycles);
+  const Moment& later = moments_[static_cast<std::size_t>(cycle_ - whole) % kRemembered];
+  const Moment& earlier = moments_[static_cast<std::size_t>(cycle_ - whole - 1) % kRemembered];
+  const double part = cycles - static_cast<double>(whole);
+  const auto between = [&](double from, double to) { return from + part * (to - from); };
+  const auto attitude = [&](const Attitude& from, const Attitude& to) -> Attitude {
+    return {between(from.roll_rad, to.roll_rad), between(from.pitch_rad, to.pitch_rad),
+            between(from.yaw_rad, to.yaw_rad)};
+  };
+  return {{later.pose.position + part * (earlier.pose.position - later.pose.position),
+           attitude(later.pose.attitude, earlier.pose.attitude)},
+          attitude(later.measured, earlier.measured)};
 }
 
 void Localisation::take_scan() {
-  const auto cycles = static_cast<long>(std::lround(settings_.lidar.sweep_s / kControlStep_s));
-  const auto at = [&](long cycle) -> const Moment& {
-    return moments_[static_cast<std::size_t>(cycle) % kRemembered];
-  };
-  scan_ = lidar_->sweep(at(cycle_ - cycles).pose, at(cycle_).pose);
-  // Motion within the sweep is small and nearly uniform: the scan counts as taken in its middle.
-  const Attitude &from = at(cycle_ - cycles).measured, &to = at(cycle_).measured;
-  scan_attitude_ = {0.5 * (from.roll_rad + to.roll_rad), 0.5 * (from.pitch_rad + to.pitch_rad),
-                    0.5 * (from.yaw_rad + to.yaw_rad)};
+  const double sweep_s = settings_.lidar.sweep_s;
+  const Moment first = moment_ago(sweep_s), middle = moment_ago(0.5 * sweep_s), last = moment_ago(0);
+  scan_ = lidar_->sweep(first.pose, last.pose);
+  scan_attitude_ = middle.measured;
+  if (settings_.filter == FlightFilter::inertial) {
+    scan_motion_ = {sweep_s, kinematic_state().tail<2>(),
+                    (last.measured.roll_rad - first.measured.roll_rad) / sweep_s};
+  }
   waiting_ = true;
 }
 
 void Localisation::correct() {
   waiting_ = false;
-  const Match match = matcher_.match(scan_, scan_attitude_, filter_->position_m());
+  const Match match = matcher_.match(scan_, scan_attitude_, kinematic_state().head<2>(), scan_motion_);
   ++matches_;
   bool used = match.accepted;
   if (used) {
-    const double age_s = settings_.cycles_of_latency * kControlStep_s + 0.5 * settings_.lidar.sweep_s;
-    constexpr double kBlindSpot_m2 = 0.1;  // what it leaves of the effect in the centre
-    const double turned = settings_.attitude_sigma_rad * settings_.attitude_sigma_rad *
-                          (match.position_m.squaredNorm() + kBlindSpot_m2);
-    used =
-        filter_->correct(match.position_m, match.covariance_m2 + turned * Eigen::Matrix2d::Identity(), age_s)
-            .accepted;
+    const MeasuredPosition position = measured(match);
+    used = std::visit([&](auto& filter) { return filter.correct(position).accepted; }, filter_);
   }
   if (!used) ++rejected_;
+}
+
+MeasuredPosition Localisation::measured(const Match& match) {
+  const double age_s = settings_.cycles_of_latency * kControlStep_s + 0.5 * settings_.lidar.sweep_s;
+  const Eigen::Vector2d per_roll_m = matcher_.moved_per_roll_m();
+  MeasuredPosition result{match.position_m, match.covariance_m2, age_s, per_roll_m};
+  if (settings_.filter == FlightFilter::thesis) {  // to which the attitude's error is noise
+    const Eigen::Vector2d by_roll_m = settings_.start.roll_sigma_rad * per_roll_m;
+    result.covariance_m2 += by_roll_m * by_roll_m.transpose();
+  }
+  return result;
+}
+
+Eigen::Vector4d Localisation::kinematic_state() const {
+  return std::visit([](const auto& filter) -> Eigen::Vector4d { return filter.state().template head<4>(); },
+                    filter_);
 }
 
 /// Normalised estimation error squared of position and velocity: 4 on average for an honest filter.
@@ -93,8 +128,13 @@ void Localisation::judge(const RigidState& truth) {
   if (cycle_ % settings_.cycles_per_scan != 0) return;
   const auto& v = truth.velocity_m_s;
   const Eigen::Vector4d error =
-      Eigen::Vector4d(truth.position_m[1], truth.position_m[2] + floor_m_, v[1], v[2]) - filter_->state();
-  nees_sum_ += error.dot(filter_->covariance().inverse() * error);
+      Eigen::Vector4d(truth.position_m[1], truth.position_m[2] + floor_m_, v[1], v[2]) - kinematic_state();
+  const Eigen::Matrix4d covariance = std::visit(
+      [](const auto& filter) -> Eigen::Matrix4d {
+        return filter.covariance().template topLeftCorner<4, 4>();
+      },
+      filter_);
+  nees_sum_ += error.dot(covariance.inverse() * error);
   ++nees_count_;
 }
 

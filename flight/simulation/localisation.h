@@ -10,19 +10,27 @@
 
 #include <array>
 #include <optional>
+#include <variant>
 
 namespace tunnelrig {
 
+enum class FlightFilter {
+  inertial,  // InertialFilter, and beams counted from where they were measured
+  thesis     // KalmanFilter, and scans taken as of the middle of their sweeps
+};
+
 struct LocalisationSettings {
+  FlightFilter filter = FlightFilter::inertial;
   LidarSettings lidar;
   int cycles_per_scan = 10;   // 40 Hz
   int cycles_of_latency = 4;  // from the sweep's end to the correction: transfer and matching, 10 ms; assumed
-  /// Not the accelerometer's noise alone: the attitude's error leaves an acceleration of g times it, which
-  /// the filter must be allowed to correct.
-  KinematicModel model = {.acceleration_variance_m2_s4 = 0.45};
   GateSettings gate;
-  double attitude_sigma_rad =
-      0.0035;  // turns the scan, which moves the match by it times the distance from the centre
+  /// What the autopilot's calibration leaves: 0.2° of roll, 0.02 m/s².
+  StartSettings start = {.bias_sigma_m_s2 = 0.02, .roll_sigma_rad = 0.0035};
+  InertialModel inertial;
+  /// Not the accelerometer's noise alone: the attitude's error, which this filter does not know of, leaves an
+  /// acceleration of g times it, which the filter must be allowed to correct.
+  KinematicModel kinematic = {.acceleration_variance_m2_s4 = 0.45};
 };
 
 /// Positions in the flight frame (z above the floor). `space` must outlive it.
@@ -45,8 +53,11 @@ class Localisation {
     Attitude measured;  // as the autopilot has it
   };
 
+  Moment moment_ago(double ago_s) const;
   void take_scan();
   void correct();
+  MeasuredPosition measured(const Match& match);
+  Eigen::Vector4d kinematic_state() const;  // position and velocity
   void judge(const RigidState& truth);
 
   double floor_m_;
@@ -54,9 +65,10 @@ class Localisation {
   const CrossSection* section_;
   ScanMatcher matcher_;
   std::optional<SimulatedLidar> lidar_;
-  std::optional<KalmanFilter> filter_;
+  std::variant<InertialFilter, KalmanFilter> filter_;
   Scan scan_;
   Attitude scan_attitude_;
+  SweepMotion scan_motion_;
   std::array<Moment, kRemembered> moments_;
   long cycle_ = 0;
   bool waiting_ = false;

@@ -88,6 +88,15 @@ void circle_goals(const std::string& tunnel, const char* controller, int runs) {
   line(what + "lost", c.lost, "", 0);
 }
 
+/// Mean over runs of the normalised error squared, per degree of freedom, and the half width of its 95 %
+/// interval.
+std::string consistency(const Comparison& c) {
+  const auto n = static_cast<double>(c.runs.size());
+  double squares = 0;
+  for (const RunResult& run : c.runs) squares += (run.nees - c.nees) * (run.nees - c.nees);
+  return fmt::format("{:.2f} ± {:.2f}", c.nees / 4, 1.96 * std::sqrt(squares / (n - 1) / n) / 4);
+}
+
 void estimator_goal(int runs) {
   const Place place("1.5");
   for (const bool exact : {false, true}) {
@@ -99,9 +108,33 @@ void estimator_goal(int runs) {
     const char* which = exact ? "sensors without bias" : "sensors with bias";
     line(fmt::format("estimator, 1.5 m, 40 mm range noise, {}: rms", which), 1e3 * c.estimator_rms_m, "mm",
          5);
-    fmt::print("  normalised error squared over its four degrees of freedom: {:.2f} (1: consistent)\n",
-               c.nees / 4);
+    fmt::print("  normalised error squared over its four degrees of freedom: {} (1: consistent)\n",
+               consistency(c));
   }
+}
+
+/// The filter that flies beside the thesis's, over the programme's places.
+void filters(int runs) {
+  fmt::print("\n{:<34} {:>20} {:>14}   {:>20} {:>14}\n", "filter in flight, 40 mm range noise",
+             "inertial: rms", "NEES of 1", "thesis's: rms", "NEES of 1");
+  for (const char* tunnel : {"1.5", "2.4", "railway"}) {
+    const Place place(tunnel);
+    for (const char* name : {"hover", "diagonal", "circle"}) {
+      const Scenario scenario = scenario_from(name, place.space, place.frame);
+      fmt::print("{:<34}", fmt::format("{}, {}", tunnel, name));
+      for (const FlightFilter filter : {FlightFilter::inertial, FlightFilter::thesis}) {
+        FlightTask task = place.task(runs, true);
+        task.scenario = &scenario;
+        task.workers = 0;
+        task.localisation->filter = filter;
+        task.localisation->lidar.range_sigma_m = 0.040;
+        const Comparison c = fly_runs(task, "ibs-map", frozen_gains());
+        fmt::print("  {:>16.2f} mm {:>15}", 1e3 * c.estimator_rms_m, consistency(c));
+      }
+      fmt::print("\n");
+    }
+  }
+  fmt::print("\n");
 }
 
 /// The error that the walls make: the flight with them less the same flight without, position given, same
@@ -143,5 +176,6 @@ int main(int argc, char** argv) {
   }
   for (const char* tunnel : {"1.5", "2.4"}) circle_goals(tunnel, "ibs-map", runs);
   estimator_goal(20);
+  filters(20);
   for (const char* tunnel : {"1.5", "2.4"}) gain_from_map(tunnel);
 }

@@ -119,6 +119,7 @@ double nanoseconds(Call call) {
 
 void filters() {
   KalmanFilter kinematic({0, 0});
+  InertialFilter inertial({0, 0});
   AugmentedFilter augmented({0, 0});
   const Eigen::Matrix2d noise = 1e-5 * Eigen::Matrix2d::Identity();
   const double both = nanoseconds([&](int i) {
@@ -129,6 +130,10 @@ void filters() {
     kinematic.predict({1e-3 * (i % 3), 0}, 0.0025);
     if (i % 10 == 9) benchmark::DoNotOptimize(kinematic.correct({1e-4 * (i % 5), 0}, noise, 0.010));
   });
+  const double flown = nanoseconds([&](int i) {
+    inertial.predict({1e-3 * (i % 3), 0}, 0.0025);
+    benchmark::DoNotOptimize(inertial.correct({{1e-4 * (i % 5), 0}, noise, 0, {0.3, -0.2}}));
+  });
   const double large = nanoseconds([&](int i) {
     augmented.predict({{0, 0}, {1e-3 * (i % 3), 0}}, 0.0025);
     benchmark::DoNotOptimize(augmented.correct({1e-4 * (i % 5), 0}, noise));
@@ -136,6 +141,7 @@ void filters() {
   fmt::print("\nfilter                                               ns per axis   goal\n");
   fmt::print("predict + correct, no latency                        {:>11.1f}   30\n", both / 2);
   fmt::print("400 Hz step, corrections at 40 Hz, 10 ms late        {:>11.1f}\n", late / 2);
+  fmt::print("inertial (7 states), predict + correct               {:>11.1f}\n", flown / 2);
   fmt::print("augmented (8 states), predict + correct              {:>11.1f}\n", large / 2);
 }
 

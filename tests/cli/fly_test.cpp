@@ -165,7 +165,7 @@ TEST_F(Fly, ATunnelThatTheVehicleDoesNotFitIsRefused) {
 
 TEST_F(Fly, OtherBadOptionsAreRefused) {
   EXPECT_THAT(refusal("--controllers lqr"), HasSubstr("no controller is called 'lqr'; there are ibs,"));
-  EXPECT_THAT(refusal("--position guessed"), HasSubstr("must be lidar or given"));
+  EXPECT_THAT(refusal("--position guessed"), HasSubstr("must be lidar, lidar-thesis or given"));
   EXPECT_THAT(refusal("--motor-loss 0.9"), HasSubstr("motor_loss"));
   EXPECT_THAT(refusal("--payload-kg nan"), HasSubstr("payload_kg"));
   write_text(folder / "g.toml", "format = \"tunnelrig-gains/1\"\n[ibs]\nk1_y = -3\n");
