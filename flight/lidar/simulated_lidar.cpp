@@ -2,6 +2,7 @@
 
 #include "datasets/error.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tunnelrig {
@@ -10,10 +11,6 @@ namespace {
 void check(const char* name, double value, double lowest, double highest) {
   if (!(value >= lowest && value <= highest))
     throw InputError::in("LIDAR", "{} is {}: it lies between {} and {}", name, value, lowest, highest);
-}
-
-bool same(const Attitude& a, const Attitude& b) {
-  return a.roll_rad == b.roll_rad && a.pitch_rad == b.pitch_rad && a.yaw_rad == b.yaw_rad;
 }
 
 }  // namespace
@@ -35,19 +32,23 @@ SimulatedLidar::SimulatedLidar(const CrossSection& section, const LidarSettings&
   }
 }
 
-Scan SimulatedLidar::sweep(const LidarPose& start, const LidarPose& end) {
+Scan SimulatedLidar::sweep(std::span<const LidarPose> path) {
+  if (path.size() < 2) throw InputError::in("LIDAR", "a sweep along {} poses: it has two ends", path.size());
+  // Between poses the projection is linear too: a turn of a degree bends the beams by less than 0.1 mrad
+  // more.
+  std::vector<Eigen::Matrix2d> projections;
+  for (const LidarPose& pose : path) projections.push_back(section_projection(pose.attitude));
   Scan scan;
   scan.range_m.reserve(directions_.size());
-  const bool turning = !same(start.attitude, end.attitude);
-  // Linear between the ends: a turn of a degree in the sweep bends the beams by less than 0.1 mrad more.
-  const Eigen::Matrix2d first = section_projection(start.attitude);
-  const Eigen::Matrix2d change = turning ? Eigen::Matrix2d(section_projection(end.attitude) - first)
-                                         : Eigen::Matrix2d(Eigen::Matrix2d::Zero());
+  const double pieces = static_cast<double>(path.size() - 1) / static_cast<double>(directions_.size() - 1);
   for (std::size_t i = 0; i < directions_.size(); ++i) {
-    const double t = static_cast<double>(i) / static_cast<double>(directions_.size() - 1);
-    const SectionPoint from = start.position + t * (end.position - start.position);
-    scan.range_m.push_back(
-        static_cast<float>(measured_m(range_m(from, (first + t * change) * directions_[i]))));
+    const double at = static_cast<double>(i) * pieces;
+    const std::size_t piece = std::min(static_cast<std::size_t>(at), path.size() - 2);
+    const double part = at - static_cast<double>(piece);
+    const SectionPoint from = path[piece].position + part * (path[piece + 1].position - path[piece].position);
+    const Eigen::Matrix2d projection =
+        projections[piece] + part * (projections[piece + 1] - projections[piece]);
+    scan.range_m.push_back(static_cast<float>(measured_m(range_m(from, projection * directions_[i]))));
   }
   return scan;
 }

@@ -6,7 +6,9 @@
 #include "flight/tunnel/cross_section.h"
 #include "flight/vehicle/random.h"
 
+#include <array>
 #include <cstdint>
+#include <span>
 
 namespace tunnelrig {
 
@@ -37,11 +39,14 @@ class SimulatedLidar {
  public:
   SimulatedLidar(const CrossSection& section, const LidarSettings& settings, std::uint64_t seed);
 
-  /// A sweep that ends at `end`, in steady motion from `start` at its first beam. Ranges without a return are
-  /// 0, as are those of a LIDAR outside the tunnel.
-  Scan sweep(const LidarPose& start, const LidarPose& end);
+  /// A sweep during which the LIDAR goes through these poses, two or more, at equal intervals of time. Ranges
+  /// without a return are 0, as are those of a LIDAR outside the tunnel.
+  Scan sweep(std::span<const LidarPose> path);
 
-  /// A sweep at rest.
+  /// In steady motion.
+  Scan sweep(const LidarPose& start, const LidarPose& end) { return sweep(std::array{start, end}); }
+
+  /// At rest.
   Scan sweep(const LidarPose& pose) { return sweep(pose, pose); }
 
   const LidarSettings& settings() const { return settings_; }

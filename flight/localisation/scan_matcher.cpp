@@ -141,7 +141,9 @@ struct ScanMatcher::Work {
     const Eigen::Vector2f travel =
         (attitude.inverse() * motion.velocity_m_s * motion.sweep_s).cast<float>();  // in the scan plane
     const auto turn_rad = static_cast<float>(motion.roll_rate_rad_s * motion.sweep_s);
-    if (travel.isZero(0) && turn_rad == 0) return;
+    const auto bend_rad =
+        static_cast<float>(0.5 * motion.roll_acceleration_rad_s2 * motion.sweep_s * motion.sweep_s);
+    if (travel.isZero(0) && turn_rad == 0 && bend_rad == 0) return;
     float nearest = static_cast<float>(settings.most_range_m);
     const float each = 1 / static_cast<float>(beams.count - 1);
     for (std::size_t i = 0; i < beams.count; ++i) {
@@ -149,7 +151,7 @@ struct ScanMatcher::Work {
       nearest = std::min(nearest, beams.range[i]);
       const float at = each * static_cast<float>(i) - 0.5F;
       // sin and cos of so small an angle
-      const float sine = at * turn_rad, cosine = 1 - 0.5F * sine * sine;
+      const float sine = at * (turn_rad + at * bend_rad), cosine = 1 - 0.5F * sine * sine;
       const Eigen::Vector2f& d = directions[i];
       const Eigen::Vector2f end =
           beams.range[i] * Eigen::Vector2f(cosine * d.x() - sine * d.y(), sine * d.x() + cosine * d.y()) +
@@ -158,8 +160,9 @@ struct ScanMatcher::Work {
       beams.cosine[i] = end.x() / beams.range[i];
       beams.sine[i] = end.y() / beams.range[i];
     }
-    bent_beams =
-        0.5 * static_cast<double>(std::abs(turn_rad) + travel.norm() / nearest) / settings.layout.step_rad;
+    bent_beams = 0.5 *
+                 static_cast<double>(std::abs(turn_rad) + std::abs(bend_rad) + travel.norm() / nearest) /
+                 settings.layout.step_rad;
   }
 
   int unknowns() const {
@@ -374,7 +377,7 @@ struct ScanMatcher::Work {
     if (!std::isfinite(imu.roll_rad) || !std::isfinite(imu.pitch_rad) || !std::isfinite(imu.yaw_rad))
       throw InputError::in("scan", "its attitude is not finite");
     if (!motion.velocity_m_s.allFinite() || !std::isfinite(motion.roll_rate_rad_s) ||
-        !std::isfinite(motion.sweep_s))
+        !std::isfinite(motion.roll_acceleration_rad_s2) || !std::isfinite(motion.sweep_s))
       throw InputError::in("scan", "the motion during its sweep is not finite");
     attitude = section_projection(imu);
     if (!(attitude.determinant() >= kMost_tilt_cosine))

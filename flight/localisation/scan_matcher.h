@@ -69,11 +69,12 @@ enum class Rejection { none, few_beams, poor_fit, noisy, unobservable, ambiguous
 /// "too few beams" …, for logs and messages.
 std::string_view text(Rejection reason);
 
-/// How the LIDAR moves while it sweeps: steadily, from the first beam to the last.
+/// How the LIDAR moves while it sweeps, in the middle of the sweep.
 struct SweepMotion {
-  double sweep_s = 0;
+  double sweep_s = 0;                  // from the first beam to the last
   Eigen::Vector2d velocity_m_s{0, 0};  // in the cross-section
   double roll_rate_rad_s = 0;
+  double roll_acceleration_rad_s2 = 0;
 };
 
 struct Match {

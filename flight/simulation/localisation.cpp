@@ -85,12 +85,20 @@ Localisation::Moment Localisation::moment_ago(double ago_s) const {
 
 void Localisation::take_scan() {
   const double sweep_s = settings_.lidar.sweep_s;
-  const Moment first = moment_ago(sweep_s), middle = moment_ago(0.5 * sweep_s), last = moment_ago(0);
-  scan_ = lidar_->sweep(first.pose, last.pose);
-  scan_attitude_ = middle.measured;
+  std::array<LidarPose, kPosesOfSweep> path;
+  for (std::size_t i = 0; i < path.size(); ++i)
+    path[i] = moment_ago(sweep_s * (1 - static_cast<double>(i) / (kPosesOfSweep - 1))).pose;
+  scan_ = lidar_->sweep(path);
+
+  const Attitude first = moment_ago(sweep_s).measured, middle = moment_ago(0.5 * sweep_s).measured,
+                 last = moment_ago(0).measured;
+  scan_attitude_ = middle;
   if (settings_.filter == FlightFilter::inertial) {
-    scan_motion_ = {sweep_s, kinematic_state().tail<2>(),
-                    (last.measured.roll_rad - first.measured.roll_rad) / sweep_s};
+    scan_motion_ = {.sweep_s = sweep_s,
+                    .velocity_m_s = kinematic_state().tail<2>(),
+                    .roll_rate_rad_s = (last.roll_rad - first.roll_rad) / sweep_s,
+                    .roll_acceleration_rad_s2 =
+                        4 * (last.roll_rad - 2 * middle.roll_rad + first.roll_rad) / (sweep_s * sweep_s)};
   }
   waiting_ = true;
 }

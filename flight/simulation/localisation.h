@@ -46,7 +46,8 @@ class Localisation {
   void finish(FlightScore& score) const;
 
  private:
-  static constexpr std::size_t kRemembered = 16;  // cycles of poses, longer than a sweep
+  static constexpr std::size_t kRemembered = 16;   // cycles of poses, longer than a sweep
+  static constexpr std::size_t kPosesOfSweep = 9;  // of the simulated sweep: about one per cycle
 
   struct Moment {
     LidarPose pose;     // true

@@ -306,7 +306,7 @@ TEST(KalmanFilter, WithTheMatcherStaysWithinFiveMillimetres) {
     if (i % 10 == 0) {
       const double sweep_s = lidar.settings().sweep_s;
       const Scan scan = lidar.sweep({position(t - sweep_s), {}}, {position(t), {}});
-      const Match match = matcher.match(scan, {}, filter.position_m(), {sweep_s, filter.velocity_m_s(), 0});
+      const Match match = matcher.match(scan, {}, filter.position_m(), {sweep_s, filter.velocity_m_s()});
       ASSERT_TRUE(match.accepted) << text(match.reason);
       filter.correct(match.position_m, match.covariance_m2, sweep_s / 2);
     }

@@ -238,12 +238,16 @@ TEST(ScanMatcher, KnownMotionIsTakenOutOfTheSweep) {
       const SectionPoint middle = 0.8 * given.reach_m * SectionPoint(std::cos(angle), std::sin(angle));
       const SectionPoint velocity(-std::sin(2 * angle), std::cos(2 * angle));
       const Attitude imu{0.1, 0.05, -0.05};
-      const double rate_rad_s = 0.5;
+      const SweepMotion motion{sweep_s, velocity, 0.5, 20};
       const auto pose = [&](double s) -> LidarPose {
-        return {middle + s * velocity, {imu.roll_rad + s * rate_rad_s, imu.pitch_rad, imu.yaw_rad}};
+        const double roll_rad =
+            imu.roll_rad + s * motion.roll_rate_rad_s + 0.5 * s * s * motion.roll_acceleration_rad_s2;
+        return {middle + s * velocity, {roll_rad, imu.pitch_rad, imu.yaw_rad}};
       };
-      const Scan scan = lidar.sweep(pose(-sweep_s / 2), pose(sweep_s / 2));
-      const Match match = matcher.match(scan, imu, {}, {sweep_s, velocity, rate_rad_s});
+      std::vector<LidarPose> path;
+      for (int k = -8; k <= 8; ++k) path.push_back(pose(k * sweep_s / 16));
+      const Scan scan = lidar.sweep(path);
+      const Match match = matcher.match(scan, imu, {}, motion);
       ASSERT_TRUE(match.accepted) << text(match.reason);
       known_m = std::max(known_m, (match.position_m - middle).norm());
       unknown_m = std::max(unknown_m, (matcher.match(scan, imu).position_m - middle).norm());
@@ -287,7 +291,7 @@ TEST(ScanMatcher, BadInputIsAnError) {
   EXPECT_THAT(message_of([&] { matcher.match(scan, {NAN, 0, 0}); }), HasSubstr("attitude"));
   EXPECT_THAT(message_of([&] { matcher.match(scan, {0, 0, 1.5}); }), HasSubstr("75°"));
   EXPECT_THAT(message_of([&] { matcher.match(scan, {}, SectionPoint(NAN, 0)); }), HasSubstr("prior"));
-  EXPECT_THAT(message_of([&] { matcher.match(scan, {}, {}, {0.02, {NAN, 0}, 0}); }), HasSubstr("motion"));
+  EXPECT_THAT(message_of([&] { matcher.match(scan, {}, {}, {0.02, {NAN, 0}}); }), HasSubstr("motion"));
   EXPECT_THAT(message_of([] { ScanMatcher(kSquare, {.cell_m = 0}); }), HasSubstr("cell_m"));
   EXPECT_THAT(message_of([] { ScanMatcher(kSquare, {.form = HoughForm::circle}); }),
               HasSubstr("circle_diameter_m"));
