@@ -43,10 +43,12 @@ struct OutputLimits {
 
 /// u₁ and φ that accelerate by `wanted`: (6.29) and (6.30), which solve (3.5).
 inline ControlOutput thrust_vector(const Plane& wanted_m_s2, double cos_tilt, const OutputLimits& limits) {
-  const double thrust = std::clamp((kGravity_m_s2 + wanted_m_s2[1]) / std::max(cos_tilt, 0.5),
-                                   limits.lowest_thrust_m_s2, limits.highest_thrust_m_s2);
-  const double sine = std::clamp(-wanted_m_s2[0] / thrust, -0.9, 0.9);
-  return {thrust, std::clamp(quick_asin(sine), -limits.roll_rad, limits.roll_rad), 0};
+  // The limits are set before the division by the tilt, so that two divisions need not wait for each other.
+  const double cosine = std::max(cos_tilt, 0.5);
+  const double upwards = std::clamp(kGravity_m_s2 + wanted_m_s2[1], cosine * limits.lowest_thrust_m_s2,
+                                    cosine * limits.highest_thrust_m_s2);
+  const double sine = std::clamp(-wanted_m_s2[0] * cosine / upwards, -0.9, 0.9);
+  return {upwards / cosine, std::clamp(quick_asin(sine), -limits.roll_rad, limits.roll_rad), 0};
 }
 
 /// A gain by name, where it stands and what it may be.

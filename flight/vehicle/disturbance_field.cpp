@@ -78,16 +78,19 @@ Layer mirrored(const MapGrid& grid, const std::vector<double>& right_value, doub
   return layer;
 }
 
-/// Hermite's cubic basis on a cell of this width: weights of value and slope at its lower and upper end.
+/// Hermite's cubic basis on a cell along y and along z, side by side: weights of value and slope at its lower
+/// and upper end.
 struct Basis {
-  double low, low_slope, high, high_slope;
+  double low[2], low_slope[2], high[2], high_slope[2];
 
-  Basis(double t, double width) {
-    const double t2 = t * t, back = t - 1, back_width = back * width;
-    high = t2 * (3 - 2 * t);
-    low = 1 - high;
-    low_slope = t * back * back_width;
-    high_slope = t2 * back_width;
+  Basis(const double (&t)[2], const double (&width)[2]) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      const double t2 = t[i] * t[i], back = t[i] - 1, back_width = back * width[i];
+      high[i] = t2 * (3 - 2 * t[i]);
+      low[i] = 1 - high[i];
+      low_slope[i] = t[i] * back * back_width;
+      high_slope[i] = t2 * back_width;
+    }
   }
 };
 
@@ -154,23 +157,23 @@ Disturbance DisturbanceField::at(double y_norm, double z_norm) const {
   const double y = std::min(1.0, std::abs(y_norm)), z = std::max(-1.0, std::min(1.0, z_norm));
   const Cell& cell_y = y_.cell_of(y, kBuckets * y);
   const Cell& cell_z = z_.cell_of(z, 0.5 * kBuckets * (z + 1));
-  const Basis by((y - cell_y.low) * cell_y.per_width, cell_y.width);
-  const Basis bz((z - cell_z.low) * cell_z.per_width, cell_z.width);
+  const Basis b({(y - cell_y.low) * cell_y.per_width, (z - cell_z.low) * cell_z.per_width},
+                {cell_y.width, cell_z.width});
   const Node* low = &nodes_[cell_z.first_node + cell_y.first_node];
   const Node* high = low + columns_;
   double value[2];
   for (std::size_t k = 0; k < 2; ++k) {
     // Sums in pairs: they wait for each other no longer than they must.
     const auto across = [&](const Node* row) {
-      return (by.low * row[0].f[k] + by.low_slope * row[0].f_y[k]) +
-             (by.high * row[1].f[k] + by.high_slope * row[1].f_y[k]);
+      return (b.low[0] * row[0].f[k] + b.low_slope[0] * row[0].f_y[k]) +
+             (b.high[0] * row[1].f[k] + b.high_slope[0] * row[1].f_y[k]);
     };
     const auto across_slope = [&](const Node* row) {
-      return (by.low * row[0].f_z[k] + by.low_slope * row[0].f_yz[k]) +
-             (by.high * row[1].f_z[k] + by.high_slope * row[1].f_yz[k]);
+      return (b.low[0] * row[0].f_z[k] + b.low_slope[0] * row[0].f_yz[k]) +
+             (b.high[0] * row[1].f_z[k] + b.high_slope[0] * row[1].f_yz[k]);
     };
-    value[k] = (bz.low * across(low) + bz.low_slope * across_slope(low)) +
-               (bz.high * across(high) + bz.high_slope * across_slope(high));
+    value[k] = (b.low[1] * across(low) + b.low_slope[1] * across_slope(low)) +
+               (b.high[1] * across(high) + b.high_slope[1] * across_slope(high));
   }
   return {value[0], y_norm < 0 ? -value[1] : value[1]};
 }
