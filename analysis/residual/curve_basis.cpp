@@ -12,7 +12,7 @@ double curve_place(CurveShape shape, double x, double low, double high) {
 
 double curve_column(CurveShape shape, int k, double u) {
   if (shape == CurveShape::kWaves) return std::cos(std::numbers::pi * k * u);
-  return (2 * u - 1) * (2 * u - 1);
+  return k == 1 ? (2 * u - 1) * (2 * u - 1) : 2 * u - 1;
 }
 
 std::string_view name_of(CurveShape shape) {

@@ -8,7 +8,7 @@ namespace tunnelrig {
 
 enum class CurveShape {
   kWaves,        // cos(π k u), k = 1 …: bends of ever shorter length
-  kParabola,     // (2u − 1)²: what a straight line lacks
+  kParabola,     // (2u − 1)²: what a straight line lacks; 2u − 1 where it stands alone
   kLogParabola,  // the same over the logarithm: what a power law lacks
 };
 

@@ -59,6 +59,19 @@ int different_values(const Covariate& covariate, const std::vector<int>& rows) {
   return static_cast<int>(values.size());
 }
 
+/// 2u − 1, on the curve's rotors.
+MatrixXd straight_over(const Curve& curve) {
+  const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
+  const MatrixXd& column = curve.columns[0][0];
+  MatrixXd straight = MatrixXd::Zero(column.rows(), column.cols());
+  for (Index row = 0; row < straight.rows(); ++row)
+    for (Index c = 0; c < straight.cols(); ++c)
+      if (straight.cols() == 1 || curve.rotor < 0 || c == curve.rotor)
+        straight(row, c) =
+            2 * curve_place(curve.shape, curve.x(row, curve.x.cols() > 1 ? c : 0), low, high) - 1;
+  return straight;
+}
+
 std::string reported_name(const std::string& covariate) {
   return covariate == "hours_in_session" ? "start_utc" : covariate;
 }
@@ -106,15 +119,9 @@ bool is_over(const Curve& curve, const std::vector<std::string>& covariates) {
 Curve without_trend(const Curve& curve, const std::vector<int>& rows) {
   Curve result = curve;
   if (curve.x.size() == 0) return result;
-  const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
+  const MatrixXd straight = straight_over(curve);
   for (Components& column : result.columns) {
     const bool own = column[0].cols() > 1 && curve.rotor >= 0;
-    MatrixXd straight = MatrixXd::Zero(column[0].rows(), column[0].cols());
-    for (Index row = 0; row < straight.rows(); ++row)
-      for (Index c = 0; c < straight.cols(); ++c)
-        if (!own || c == curve.rotor)
-          straight(row, c) =
-              2 * curve_place(curve.shape, curve.x(row, curve.x.cols() > 1 ? c : 0), low, high) - 1;
     const Index first = own ? curve.rotor : 0, channels = own ? 1 : straight.cols();
     const MatrixXd w = straight.middleCols(first, channels)(rows, Eigen::all),
                    y = column[0].middleCols(first, channels)(rows, Eigen::all);
@@ -122,6 +129,19 @@ Curve without_trend(const Curve& curve, const std::vector<int>& rows) {
     result.tilt.push_back((centred * y.array()).sum() / centred.square().sum());
     column[0] -= result.tilt.back() * straight;
   }
+  return result;
+}
+
+Curve with_trend(const Curve& curve) {
+  Curve result = curve;
+  if (curve.tilt.empty()) return result;
+  const MatrixXd straight = straight_over(curve);
+  for (std::size_t k = 0; k < curve.tilt.size(); ++k) result.columns[k][0] += curve.tilt[k] * straight;
+  result.tilt.clear();
+  if (curve.shape == CurveShape::kWaves) return result;  // the longest of which is a trend
+  Components column(curve.columns[0].size(), MatrixXd::Zero(straight.rows(), straight.cols()));
+  column[0] = straight;
+  result.columns.push_back(std::move(column));
   return result;
 }
 

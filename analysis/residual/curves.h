@@ -30,6 +30,9 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
 /// The same without what is straight: beside a named effect of the same covariate, whose work that is.
 Curve without_trend(const Curve& curve, const std::vector<int>& rows);
 
+/// A curve without its straight part that has to do all of the covariate's work: the same with it.
+Curve with_trend(const Curve& curve);
+
 /// Whether one of these covariates is what the curve is over.
 bool is_over(const Curve& curve, const std::vector<std::string>& covariates);
 

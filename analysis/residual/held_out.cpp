@@ -201,13 +201,19 @@ VectorXd CrossValidation::losses() const {
 LossDifference compare(const CrossValidation& worse, const CrossValidation& better) {
   const VectorXd difference = worse.losses() - better.losses();
   const double n = static_cast<double>(difference.size());
-  LossDifference result{.mean = difference.mean()};
+  LossDifference result{.mean = difference.mean(), .total = difference.sum()};
   result.standard_error = std::sqrt((difference.array() - result.mean).square().sum() / (n * (n - 1)));
   double distance2 = 0;
   for (std::size_t fold = 0; fold < worse.folds.size(); ++fold)
     distance2 += (worse.folds[fold].whitened - better.folds[fold].whitened).squaredNorm();
   result.expected_standard_error = 2 * std::sqrt(distance2) / n;
   return result;
+}
+
+bool LossDifference::told_apart() const {
+  constexpr double kLikelihoodRatio = 20;
+  return mean >= 2 * std::min(standard_error, expected_standard_error) &&
+         total >= 2 * std::log(kLikelihoodRatio);
 }
 
 }  // namespace tunnelrig

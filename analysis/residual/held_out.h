@@ -59,6 +59,13 @@ struct LossDifference {
   /// differ by d. Where few folds hold all of the difference, these folds' scatter says nothing of its error,
   /// and this does.
   double expected_standard_error = 0;
+
+  double total = 0;  // twice the logarithm of the likelihood ratio of what was held out
+
+  /// Whether the data tell the two models apart: the mean is at least two standard errors (the smaller of the
+  /// two), and the likelihood ratio at least 20. Models that predict nearly the same differ by little,
+  /// however surely.
+  bool told_apart() const;
 };
 LossDifference compare(const CrossValidation& worse, const CrossValidation& better);
 

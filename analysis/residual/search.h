@@ -67,8 +67,13 @@ class Search {
   /// Whether the newest curve, over a covariate of this effect, does more than the effect: then the effect
   /// was only the curve's straight part.
   bool outshone_by_curve(const Term& term) const;
-  /// The newest curve with its straight part, which no name takes any more.
-  void restore_trend();
+  void add_curve(const Curve& curve, double p);
+  /// Whether a curve over the same covariate and rotor is in.
+  bool is_described(const Curve& curve) const;
+  /// Drops accepted effect t, and gives the newest curve the straight part that no name takes any more.
+  void give_way_to_curve(std::size_t t);
+  /// Effects whose own covariate bends away from their formula give way to a curve.
+  void doubt_formulas();
   bool session_scatter_is_large() const;
 
   // what cannot be told apart: search_rivals.cpp

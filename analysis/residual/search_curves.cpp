@@ -12,6 +12,11 @@ namespace tunnelrig {
 namespace {
 
 constexpr double kKeptP = 0.01;  // an effect stays beside a curve only if its own p is below
+/// A formula that leaves more than this of its own size, rms, as a curve over its own covariate is not what
+/// the covariate does. One with a time constant or a length can bend towards the curve, and must do less than
+/// it.
+constexpr double kMostLeft = 0.3, kMostLeft_bending = 1;
+constexpr double kDoubtedP = 0.01;  // of a bend beside an effect, tested alone
 
 }  // namespace
 
@@ -20,6 +25,7 @@ void Search::add_curves() {
     drop_what_a_curve_replaces();
     add_effects();
   }
+  doubt_formulas();
 }
 
 bool Search::add_best_curve() {
@@ -27,11 +33,7 @@ bool Search::add_best_curve() {
   Scan scan;
   std::vector<Curve> tried;
   for (std::size_t c = 0; c < curves_.size(); ++c) {
-    const bool in = std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
-      return found.curve.covariate == curves_[c].covariate &&
-             (found.curve.rotor < 0 || found.curve.rotor == curves_[c].rotor);
-    });
-    if (in) continue;
+    if (is_described(curves_[c])) continue;
     const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
       return is_over(curves_[c], a.term.effect->covariates);
     });
@@ -52,12 +54,56 @@ bool Search::add_best_curve() {
   round.outcome = fmt::format("p = {:.3g} for {}", p, tried[best].label());
   result_.curve_rounds.push_back(std::move(round));
   if (p > settings_.alpha) return false;
-  result_.curves.push_back({tried[best], p});
+  add_curve(tried[best], p);
+  return true;
+}
+
+bool Search::is_described(const Curve& curve) const {
+  return std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
+    return found.curve.covariate == curve.covariate &&
+           (found.curve.rotor < 0 || found.curve.rotor == curve.rotor);
+  });
+}
+
+void Search::add_curve(const Curve& curve, double p) {
+  result_.curves.push_back({curve, p});
   MeanModel model = fit_.model;
-  model.curves.push_back(tried[best]);
+  model.curves.push_back(curve);
   fit_ = fit_jointly(observations_, model, rows_);
   read_back_terms();
-  return true;
+}
+
+/// That the response depends on the covariate is settled; this asks whether it does so by the formula. The
+/// test is one bend for one effect, and needs no maximum over everything.
+void Search::doubt_formulas() {
+  for (std::size_t t = result_.accepted.size(); t-- > 0;) {
+    const Term term = result_.accepted[t].term;
+    if (term.per_group || term.effect->parameters.size() > 1 ||
+        static_cast<int>(result_.curves.size()) >= settings_.most_curves)
+      continue;
+    for (const Curve& curve : curves_) {
+      if (curve.columns.size() != 1 || curve.x.size() == 0 || curve.rotor != term.rotor ||
+          !is_over(curve, term.effect->covariates) || is_described(curve))
+        continue;
+      const Curve bend = without_trend(curve, rows_);
+      Scan scan;
+      scan.candidates.push_back(as_candidate(bend));
+      if (!can_be_seen(scan.candidates[0])) continue;
+      rank(fit_, scan);
+      const double p =
+          NullMaxima(*scan.scan, fit_.variances, settings_, 2000 + ++salt_).p(scan.fits[0].evidence);
+      if (p > kDoubtedP) continue;
+      const JointFit before = fit_;
+      add_curve(bend, p);
+      if (outshone_by_curve(term)) {
+        give_way_to_curve(t);
+        break;
+      }
+      result_.curves.pop_back();
+      fit_ = before;
+      read_back_terms();
+    }
+  }
 }
 
 void Search::drop_what_a_curve_replaces() {
@@ -67,11 +113,24 @@ void Search::drop_what_a_curve_replaces() {
     const JointFit without = fit_without(t);
     const double ratio = std::max(0.0, fit_.variances.log_likelihood - without.variances.log_likelihood);
     if (ratio_p(ratio, fit_) < kKeptP && !at_bound(fit_, result_.accepted[t].term) && !outshone) continue;
-    result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
-    fit_ = without;
-    read_back_terms();
-    if (outshone) restore_trend();
+    if (outshone) {
+      give_way_to_curve(t);
+    } else {
+      result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
+      fit_ = without;
+      read_back_terms();
+    }
   }
+}
+
+void Search::give_way_to_curve(std::size_t t) {
+  fit_ = fit_without(t);
+  result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
+  Curve& curve = result_.curves.back().curve;
+  curve = with_trend(curve);
+  fit_.model.curves.back() = curve;
+  fit_ = fit_jointly(observations_, fit_.model, rows_);
+  read_back_terms();
 }
 
 bool Search::outshone_by_curve(const Term& term) const {
@@ -85,18 +144,8 @@ bool Search::outshone_by_curve(const Term& term) const {
   for (Eigen::Index k = 0; k < columns; ++k)
     drawn += amplitude(k) * curve.columns[static_cast<std::size_t>(k)][0];
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
-  return rms_of(drawn) > rms_of(respond(term, observations_, predicted).value[0]);
-}
-
-void Search::restore_trend() {
-  Curve& curve = result_.curves.back().curve;
-  for (const Curve& plain : curves_)
-    if (plain.covariate == curve.covariate && plain.rotor == curve.rotor && plain.shape == curve.shape &&
-        plain.columns.size() == curve.columns.size())
-      curve = plain;
-  fit_.model.curves.back() = curve;
-  fit_ = fit_jointly(observations_, fit_.model, rows_);
-  read_back_terms();
+  const double most = term.effect->parameters.size() > 1 ? kMostLeft_bending : kMostLeft;
+  return rms_of(drawn) > most * rms_of(respond(term, observations_, predicted).value[0]);
 }
 
 bool Search::session_scatter_is_large() const {

@@ -57,9 +57,7 @@ std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& wit
     const bool listed = std::any_of(result.begin(), result.end(),
                                     [&](const Ranked& r) { return r.term.effect->name == name; });
     if (listed) continue;
-    const LossDifference difference = compare(validate(scan.ways[i], scan.candidates[i]), *own);
-    if (difference.mean >= 2 * std::min(difference.standard_error, difference.expected_standard_error))
-      continue;
+    if (compare(validate(scan.ways[i], scan.candidates[i]), *own).told_apart()) continue;
     Term term = scan.ways[i];
     term.parameters[0] = term.effect->theory_only ? *term.effect->theory() : scan.fits[i].amplitude(0);
     result.push_back({term, scan.fits[i].evidence, 0, term.parameters[0], 0});
@@ -86,11 +84,8 @@ std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
     if (taken) continue;
     Observations other = observations_;
     other.slopes.col(place) = respond(way, observations_, predicted).derivative[0][0];
-    const LossDifference difference_of_loss =
-        compare(cross_validate(other, y, fit_.linear.columns, fit_.variances, rows_), own);
-    const double error =
-        std::min(difference_of_loss.standard_error, difference_of_loss.expected_standard_error);
-    if (difference_of_loss.mean < 2 * error) result.push_back({.term = way});
+    const CrossValidation with_other = cross_validate(other, y, fit_.linear.columns, fit_.variances, rows_);
+    if (!compare(with_other, own).told_apart()) result.push_back({.term = way});
   }
   return result;
 }

@@ -176,6 +176,36 @@ TEST_F(ExplainTest, StructureWithoutANameIsUnknown) {
   expect_contract(both);
 }
 
+/// A trend that bends: the best formula of the library takes the trend, and is not what the covariate does.
+TEST_F(ExplainTest, AFormulaThatItsOwnCovariateBendsAwayFromIsNoName) {
+  Observations o = observations(16);
+  const Eigen::ArrayXd u = 2 * (o.find("supply_voltage_V")->value.array() - 16);  // −1 … 1
+  const Eigen::MatrixXd bent = 0.004 * (u + 1.5 * u.square()).matrix();
+  test::set_y(o, o.y + bent.replicate(1, 4));
+  const Explanation e = explained(o);
+  SCOPED_TRACE(explanation_text(e));
+  EXPECT_EQ(e.verdict, "unknown");
+  EXPECT_TRUE(e.adopted.empty());
+  ASSERT_EQ(e.unknown.size(), 1u);
+  EXPECT_EQ(e.unknown[0].covariate, "supply_voltage_V");
+  // trend and bend, within the band at its two ends and in the middle
+  const auto at = [&](double volts) {
+    return *std::min_element(
+        e.unknown[0].shape.begin(), e.unknown[0].shape.end(),
+        [&](const auto& a, const auto& b) { return std::abs(a.x - volts) < std::abs(b.x - volts); });
+  };
+  EXPECT_GT(at(16.4).y, at(16).y + 0.02);
+  EXPECT_GT(at(16.4).y, at(15.6).y + 0.02);
+  expect_contract(e);
+
+  Observations straight = observations(16);
+  test::add_effect(straight, "supply_voltage", {0.3});
+  const Explanation named = explained(straight);
+  ASSERT_EQ(named.adopted.size(), 1u);
+  EXPECT_EQ(named.adopted[0].term.effect->name, "supply_voltage");
+  EXPECT_TRUE(named.unknown.empty());
+}
+
 TEST_F(ExplainTest, AnEffectOfOneRotorIsThatRotors) {
   Observations o = observations(16);
   test::add_covariate(o, "cable_force_N", -1, 1, random);

@@ -198,6 +198,18 @@ TEST(CrossValidation, LeavesOutEachBlockOnce) {
   const LossDifference none = compare(validation, validation);
   EXPECT_EQ(none.mean, 0);
   EXPECT_EQ(none.standard_error, 0);
+  EXPECT_EQ(none.total, 0);
+  EXPECT_FALSE(none.told_apart());
+}
+
+TEST(CrossValidation, ModelsAreToldApartByMuchAndSurely) {
+  const auto difference = [](double mean, double standard_error, double expected, double total) {
+    return LossDifference{mean, standard_error, expected, total};
+  };
+  EXPECT_TRUE(difference(1, 0.4, 0.6, 12).told_apart());
+  EXPECT_FALSE(difference(1, 0.6, 0.6, 12).told_apart()) << "within two standard errors";
+  EXPECT_FALSE(difference(0.1, 0.01, 0.01, 1.2).told_apart()) << "likelihoods of 1.8 to 1, however surely";
+  EXPECT_FALSE(difference(-1, 0.4, 0.6, -12).told_apart()) << "the better one";
 }
 
 TEST(CrossValidation, ManyBlocksAreDealtOut) {
