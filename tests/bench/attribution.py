@@ -213,6 +213,7 @@ def parse_arguments():
                                      epilog="Example: ./rig bench attribution --campaigns 10 --track one --noise white")
     parser.add_argument("build", type=pathlib.Path, help=argparse.SUPPRESS)
     parser.add_argument("--campaigns", type=int, help="per cell (200, overnight; smoke: 3)")
+    parser.add_argument("--first", type=int, default=0, help="number of the first one: others than those that a rule was made on")
     parser.add_argument("--track", action="append", choices=TRACKS)
     parser.add_argument("--noise", action="append", choices=NOISES)
     parser.add_argument("--blocks", action="append", type=int)
@@ -240,7 +241,7 @@ def main():
         print("this program has no verb explain; there is nothing to score", file=sys.stderr)
         return SKIPPED
     campaigns = options.campaigns or (3 if options.smoke else 200)
-    wanted = [(one, index) for one in chosen_cells(options) for index in range(campaigns)]
+    wanted = [(one, index) for one in chosen_cells(options) for index in range(options.first, options.first + campaigns)]
     if not wanted:
         print("no cell is left of this choice", file=sys.stderr)
         return 2
