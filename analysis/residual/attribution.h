@@ -50,6 +50,7 @@ struct Accepted {
 struct FoundCurve {
   Curve curve;
   double p = 1;
+  std::vector<std::string> instead_of;  // effects that were in, until the curve showed their formulas wrong
 };
 
 struct Attribution {

@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
                           const std::vector<int>& rows) {
   constexpr int kPoints = 25;
-  UnknownStructure result{found.curve.covariate, found.curve.rotor, found.p, 0, {}};
+  UnknownStructure result{found.curve.covariate, found.curve.rotor, found.p, 0, {}, found.instead_of};
   const Components y = difference(response_components(observations), fit.linear.offset);
   const AmplitudeFit amplitudes = fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);
   Index first = static_cast<Index>(fit.linear.columns.size());
@@ -59,7 +59,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
 
 UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual,
                                    const std::vector<int>& rows) {
-  UnknownStructure result{"session", -1, 0.025, 0, {}};
+  UnknownStructure result{"session", -1, 0.025, 0, {}, {}};
   std::map<int, std::vector<double>> offsets;
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const double mean = -residual.row(static_cast<Index>(r)).mean();

@@ -50,6 +50,7 @@ struct UnknownStructure {
   double p_value = 1;
   double amplitude = 0;  // half of peak to peak, unit of the response
   std::vector<ShapePoint> shape;
+  std::vector<std::string> instead_of;  // effects over this covariate that do not follow it
 };
 
 struct Untestable {

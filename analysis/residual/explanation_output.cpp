@@ -53,7 +53,8 @@ Json unknown_json(const UnknownStructure& unknown) {
           {"rotor", rotor_json(unknown.rotor)},
           {"p_value", finite(unknown.p_value)},
           {"amplitude", finite(unknown.amplitude)},
-          {"shape", shape}};
+          {"shape", shape},
+          {"instead_of", unknown.instead_of}};
 }
 
 std::string parameters_in_words(const AdoptedEffect& adopted) {
@@ -131,6 +132,8 @@ std::string explanation_text(const Explanation& e) {
     text += fmt::format("\n  unknown: depends on {}{}, amplitude {:.3g}{}, p = {:.3g}\n", u.covariate,
                         u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit,
                         u.p_value);
+    if (!u.instead_of.empty())
+      text += fmt::format("    in which it bends away from the formula of {}\n", joined(u.instead_of));
   }
   text += fmt::format(
       "\nerror on blocks held out{}: before {:.4g} [{:.4g}, {:.4g}], after {:.4g} [{:.4g}, {:.4g}], noise "

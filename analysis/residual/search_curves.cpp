@@ -66,7 +66,7 @@ bool Search::is_described(const Curve& curve) const {
 }
 
 void Search::add_curve(const Curve& curve, double p) {
-  result_.curves.push_back({curve, p});
+  result_.curves.push_back({.curve = curve, .p = p, .instead_of = {}});
   MeanModel model = fit_.model;
   model.curves.push_back(curve);
   fit_ = fit_jointly(observations_, model, rows_);
@@ -124,11 +124,12 @@ void Search::drop_what_a_curve_replaces() {
 }
 
 void Search::give_way_to_curve(std::size_t t) {
+  FoundCurve& found = result_.curves.back();
+  found.instead_of.push_back(result_.accepted[t].term.effect->name);
   fit_ = fit_without(t);
   result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
-  Curve& curve = result_.curves.back().curve;
-  curve = with_trend(curve);
-  fit_.model.curves.back() = curve;
+  found.curve = with_trend(found.curve);
+  fit_.model.curves.back() = found.curve;
   fit_ = fit_jointly(observations_, fit_.model, rows_);
   read_back_terms();
 }

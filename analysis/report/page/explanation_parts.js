@@ -110,6 +110,7 @@ function confusionText({confounded_with: rivals, separating_run: run}) {
   return `These data cannot tell it from ${list}.${remedy}`;
 }
 
-const unknownText = ({covariate, rotor, amplitude, p_value: p}, unit) =>
+const unknownText = ({covariate, rotor, amplitude, p_value: p, instead_of: insteadOf = []}, unit) =>
     `Depends on \`${covariate}\`${rotor ? ` at rotor ${rotor}` : ''}: amplitude ${digits(amplitude)}${
-        unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.`;
+        unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${
+        insteadOf.length ? ` It bends away from the formula of ${insteadOf.join(', ')}.` : ''}`;

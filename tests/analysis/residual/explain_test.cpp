@@ -69,7 +69,7 @@ void expect_contract(const Explanation& explanation) {
     }
   }
   for (const json& unknown : written["unknown"]) {
-    for (const char* key : {"covariate", "rotor", "p_value", "amplitude", "shape"})
+    for (const char* key : {"covariate", "rotor", "p_value", "amplitude", "shape", "instead_of"})
       EXPECT_TRUE(unknown.contains(key)) << key;
     for (const json& point : unknown["shape"]) EXPECT_EQ(point.size(), 4u);
   }
@@ -188,6 +188,8 @@ TEST_F(ExplainTest, AFormulaThatItsOwnCovariateBendsAwayFromIsNoName) {
   EXPECT_TRUE(e.adopted.empty());
   ASSERT_EQ(e.unknown.size(), 1u);
   EXPECT_EQ(e.unknown[0].covariate, "supply_voltage_V");
+  EXPECT_THAT(e.unknown[0].instead_of, testing::ElementsAre("supply_voltage"));
+  EXPECT_THAT(explanation_text(e), HasSubstr("bends away from the formula of supply_voltage"));
   // trend and bend, within the band at its two ends and in the middle
   const auto at = [&](double volts) {
     return *std::min_element(
