@@ -333,7 +333,9 @@ std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::si
                                                  null.ratio_probability[s].end());
     std::vector<std::size_t> ratio(count);
     for (std::size_t& r : ratio) r = draw(random);
-    data.push_back(impl_->model.simulate(s, std::vector<double>(count, null.sigma[s]), ratio, random));
+    const double correlation = null.run_correlation.empty() ? 0 : null.run_correlation[s];
+    data.push_back(
+        impl_->model.simulate(s, std::vector<double>(count, null.sigma[s]), ratio, correlation, random));
   }
   const Impl::Data products = impl_->multiply_data(data);
   std::vector<double> maxima(count, 0.0);

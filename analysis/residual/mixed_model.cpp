@@ -206,9 +206,11 @@ Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t r
 }
 
 Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sigma,
-                             const std::vector<std::size_t>& ratio, std::mt19937_64& random) const {
+                             const std::vector<std::size_t>& ratio, double run_correlation,
+                             std::mt19937_64& random) const {
   std::normal_distribution<double> normal;
   const Index n = static_cast<Index>(rows_.size());
+  const double fresh = std::sqrt(1 - run_correlation * run_correlation);
   Stacked result(n * strata_[stratum].modes, static_cast<Index>(sigma.size()));
   for (Index i = 0; i < result.cols(); ++i) {
     for (Index k = 0; k < result.rows(); ++k) result(k, i) = normal(random);
@@ -216,6 +218,8 @@ Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sig
     const double session = std::sqrt(kRatios[ratio[static_cast<std::size_t>(i)]]);
     for (Index mode = 0; mode < modes.cols(); ++mode) {
       for (const auto& runs : blocks_) {
+        for (std::size_t k = 1; k < runs.size() && run_correlation != 0; ++k)
+          modes(runs[k], mode) = run_correlation * modes(runs[k - 1], mode) + fresh * modes(runs[k], mode);
         const double offset = session * normal(random);
         for (const Index run : runs) modes(run, mode) += offset;
       }

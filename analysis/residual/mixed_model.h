@@ -39,6 +39,7 @@ class MixedModel {
              const std::vector<std::size_t>& ratio = {});
 
   const std::vector<int>& rows() const { return rows_; }
+  const std::vector<std::vector<Eigen::Index>>& blocks() const { return blocks_; }  // positions in rows()
   const std::vector<Stratum>& strata() const { return strata_; }
   Eigen::Index dof(std::size_t stratum) const;  // runs · modes less the baseline's
   double log_determinant(std::size_t stratum,
@@ -61,10 +62,11 @@ class MixedModel {
   Eigen::VectorXd baseline_variance(std::size_t stratum, std::size_t ratio,
                                     const std::vector<int>& rows) const;
 
-  /// Draws data without any effect: session and run scatter of the given σ and ratio. Stacked, `count`
-  /// columns.
+  /// Draws data without any effect: session and run scatter of the given σ and ratio, a run's scatter
+  /// correlated with that of the run before in its block. Stacked, a column for each σ.
   Stacked simulate(std::size_t stratum, const std::vector<double>& sigma,
-                   const std::vector<std::size_t>& ratio, std::mt19937_64& random) const;
+                   const std::vector<std::size_t>& ratio, double run_correlation,
+                   std::mt19937_64& random) const;
 
   /// Orthonormal, c × c; the first column is the mean's.
   const Eigen::MatrixXd& mode_matrix() const { return modes_; }

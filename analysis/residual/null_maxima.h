@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
 namespace tunnelrig {
@@ -14,9 +15,8 @@ namespace tunnelrig {
 /// before the p that was asked for is settled (Besag & Clifford 1991).
 class NullMaxima {
  public:
-  NullMaxima(const CandidateScan& scan, const NullFit& null, const SearchSettings& settings,
-             std::uint64_t salt)
-      : scan_(scan), null_(null), settings_(settings), random_(settings.seed * 1000003 + salt) {}
+  NullMaxima(const CandidateScan& scan, NullFit null, const SearchSettings& settings, std::uint64_t salt)
+      : scan_(scan), null_(std::move(null)), settings_(settings), random_(settings.seed * 1000003 + salt) {}
 
   double p(double evidence) {
     constexpr std::size_t kBatch = 111, kEnough = 30;
@@ -49,7 +49,7 @@ class NullMaxima {
   }
 
   const CandidateScan& scan_;
-  const NullFit& null_;
+  const NullFit null_;
   const SearchSettings& settings_;
   std::mt19937_64 random_;
   std::vector<double> maxima_;

@@ -75,6 +75,10 @@ class Search {
   /// Effects whose own covariate bends away from their formula give way to a curve.
   void doubt_formulas();
   bool session_scatter_is_large() const;
+  /// The fitted variances, and how far neighbouring runs resemble each other beside the model and this
+  /// curve, whose own dependence on what drifts must not count as theirs. A smooth curve over what drifts
+  /// follows runs that do, and has no held-out gate to stop it.
+  NullFit correlated_null(const Curve& beside) const;
 
   // what cannot be told apart: search_rivals.cpp
   void find_confounded();

@@ -1,5 +1,6 @@
 // Structure without a name.
 #include "analysis/residual/null_maxima.h"
+#include "analysis/residual/run_correlation.h"
 #include "analysis/residual/search.h"
 
 #include <algorithm>
@@ -45,8 +46,8 @@ bool Search::add_best_curve() {
   }
   if (tried.empty()) return false;
   rank(fit_, scan);
-  NullMaxima maxima(*scan.scan, fit_.variances, settings_, 1000 + ++salt_);
   const std::size_t best = scan.order[0];
+  NullMaxima maxima(*scan.scan, correlated_null(tried[best]), settings_, 1000 + ++salt_);
   const double p = maxima.p(scan.fits[best].evidence);
   Round round;
   round.observed = scan.fits[best].evidence;
@@ -91,7 +92,7 @@ void Search::doubt_formulas() {
       if (!can_be_seen(scan.candidates[0])) continue;
       rank(fit_, scan);
       const double p =
-          NullMaxima(*scan.scan, fit_.variances, settings_, 2000 + ++salt_).p(scan.fits[0].evidence);
+          NullMaxima(*scan.scan, correlated_null(bend), settings_, 2000 + ++salt_).p(scan.fits[0].evidence);
       if (p > kDoubtedP) continue;
       const JointFit before = fit_;
       add_curve(bend, p);
@@ -147,6 +148,20 @@ bool Search::outshone_by_curve(const Term& term) const {
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
   const double most = term.effect->parameters.size() > 1 ? kMostLeft_bending : kMostLeft;
   return rms_of(drawn) > most * rms_of(respond(term, observations_, predicted).value[0]);
+}
+
+NullFit Search::correlated_null(const Curve& beside) const {
+  std::vector<Components> columns = fit_.linear.columns;
+  columns.insert(columns.end(), beside.columns.begin(), beside.columns.end());
+  Components residual = difference(y_, fit_.linear.offset);
+  const AmplitudeFit fit = fit_amplitudes(observations_, residual, columns, fit_.variances, rows_);
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    for (std::size_t j = 0; j < residual.size(); ++j)
+      residual[j] -= fit.amplitude(static_cast<Eigen::Index>(c)) * columns[c][j];
+  std::mt19937_64 random(settings_.seed * 1000003 + 3000 + salt_);
+  NullFit null = fit_.variances;
+  null.run_correlation = run_correlation(*mixed_, null, residual, random);
+  return null;
 }
 
 bool Search::session_scatter_is_large() const {

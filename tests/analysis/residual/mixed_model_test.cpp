@@ -1,6 +1,7 @@
 // The random part of the model against dense algebra.
 #include "analysis/residual/mixed_model.h"
 
+#include "analysis/residual/run_correlation.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 
@@ -73,7 +74,7 @@ TEST_P(MixedModelTest, WhitenedSimulationsHaveTheIdentityAsCovariance) {
     if (model.strata()[s].means()) continue;
     for (const std::size_t ratio : {std::size_t{0}, std::size_t{5}}) {
       Stacked data = model.simulate(s, std::vector<double>(kSets, sigma),
-                                    std::vector<std::size_t>(kSets, ratio), random);
+                                    std::vector<std::size_t>(kSets, ratio), 0, random);
       model.project(s, ratio, data);
       const MatrixXd covariance = data * data.transpose() / (sigma * sigma * kSets);
       const MatrixXd excess = covariance - MatrixXd::Identity(data.rows(), data.rows());
@@ -187,6 +188,37 @@ TEST(MixedModel, BlocksOfSingleRowsHaveOneRatio) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Rotors, MixedModelTest, testing::Values(1, 4));
+
+/// Estimated through everything that the baseline takes from the data.
+TEST(RunCorrelation, IsFoundWhereItIsAndNowhereElse) {
+  SCOPED_TRACE(testing::Message() << "seed " << test::seed());
+  std::mt19937_64 random(test::seed());
+  constexpr int kCampaigns = 40;
+  for (const double truth : {0.0, 0.5}) {
+    double mean = 0;
+    int found = 0;
+    for (int i = 0; i < kCampaigns; ++i) {
+      Observations o =
+          test::simulate({.runs_of_block = std::vector<int>(13, 12), .groups = 40, .channels = 4}, random);
+      const MixedModel model(o, test::all_rows(o));
+      const Components y = {o.y};
+      NullFit fit = CandidateScan(model, {}, {}).null_fit(y);
+      const Stacked drawn = model.simulate(1, {1.0}, {fit.ratio[1]}, truth, random);
+      // the difference modes' data, turned back into rotors
+      const Eigen::Map<const Eigen::MatrixXd> modes(drawn.data(), o.rows(), 3);
+      const Components rotors = {modes * model.mode_matrix().rightCols(3).transpose()};
+      const double correlation = run_correlation(model, fit, rotors, random)[1];
+      mean += correlation / kCampaigns;
+      found += correlation > 0 ? 1 : 0;
+    }
+    EXPECT_NEAR(mean, truth, 0.06);
+    if (truth == 0) {
+      EXPECT_LE(found, 6) << "2.5 % of 40 are expected";
+    } else {
+      EXPECT_EQ(found, kCampaigns);
+    }
+  }
+}
 
 }  // namespace
 }  // namespace tunnelrig

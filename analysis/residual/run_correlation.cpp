@@ -1,0 +1,66 @@
+#include "analysis/residual/run_correlation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+
+constexpr std::size_t kSimulated = 100;
+constexpr double kKnown = 0.5;  // correlation of the second simulation
+constexpr double kMost = 0.9;
+
+/// Σ e_i e_{i+1} / Σ e_i² over neighbours within blocks, one per column.
+Eigen::VectorXd of_neighbours(const MixedModel& model, std::size_t stratum, const Stacked& columns) {
+  const auto n = static_cast<Index>(model.rows().size());
+  Eigen::VectorXd result(columns.cols());
+  for (Index i = 0; i < columns.cols(); ++i) {
+    const Eigen::Map<const Eigen::MatrixXd> modes(columns.col(i).data(), n, model.strata()[stratum].modes);
+    double products = 0;
+    for (const auto& runs : model.blocks())
+      for (std::size_t k = 1; k < runs.size(); ++k)
+        products += modes.row(runs[k]).dot(modes.row(runs[k - 1]));
+    result(i) = products / std::max(columns.col(i).squaredNorm(), 1e-300);
+  }
+  return result;
+}
+
+struct Spread {
+  double mean, deviation;
+};
+
+Spread simulated(const MixedModel& model, const NullFit& fit, std::size_t stratum, double correlation,
+                 std::mt19937_64& random) {
+  const std::size_t ratio = fit.ratio[stratum];
+  Stacked data = model.simulate(stratum, std::vector<double>(kSimulated, 1.0),
+                                std::vector<std::size_t>(kSimulated, ratio), correlation, random);
+  model.project(stratum, ratio, data);
+  const Eigen::VectorXd seen = of_neighbours(model, stratum, data);
+  return {seen.mean(), std::sqrt((seen.array() - seen.mean()).square().mean())};
+}
+
+}  // namespace
+
+std::vector<double> run_correlation(const MixedModel& model, const NullFit& fit, const Components& residual,
+                                    std::mt19937_64& random) {
+  std::vector<double> result(model.strata().size(), 0.0);
+  const bool neighbours = std::any_of(model.blocks().begin(), model.blocks().end(),
+                                      [](const auto& runs) { return runs.size() > 1; });
+  if (!neighbours) return result;
+  for (std::size_t s = 0; s < result.size(); ++s) {
+    if (!model.strata()[s].means()) continue;
+    Stacked column = model.stack(s, {&residual});
+    model.project(s, fit.ratio[s], column);
+    const double seen = of_neighbours(model, s, column)(0);
+    const Spread none = simulated(model, fit, s, 0, random);
+    if (seen < none.mean + 2 * none.deviation) continue;
+    const Spread known = simulated(model, fit, s, kKnown, random);
+    result[s] = std::clamp(kKnown * (seen - none.mean) / (known.mean - none.mean), 0.0, kMost);
+  }
+  return result;
+}
+
+}  // namespace tunnelrig
