@@ -156,9 +156,13 @@ struct ScanMatcher::Work {
       const Eigen::Vector2f end =
           beams.range[i] * Eigen::Vector2f(cosine * d.x() - sine * d.y(), sine * d.x() + cosine * d.y()) +
           at * travel;
-      beams.range[i] = end.norm();
-      beams.cosine[i] = end.x() / beams.range[i];
-      beams.sine[i] = end.y() / beams.range[i];
+      const float range = end.norm();
+      // Nothing is left of a beam by a motion that cannot be.
+      const bool real = range >= static_cast<float>(settings.least_range_m) && std::isfinite(range);
+      beams.range[i] = real ? range : 0;
+      if (!real) continue;
+      beams.cosine[i] = end.x() / range;
+      beams.sine[i] = end.y() / range;
     }
     bent_beams = 0.5 *
                  static_cast<double>(std::abs(turn_rad) + std::abs(bend_rad) + travel.norm() / nearest) /
@@ -410,6 +414,7 @@ struct ScanMatcher::Work {
                 static_cast<float>(settings.most_slope), 3, sums);
     Eigen::Matrix2d normal;
     normal << sums.normal[0][0], sums.normal[1][0], sums.normal[1][0], sums.normal[1][1];
+    if (!(normal.determinant() > 0)) return {0, 0};
     return -(normal.inverse() * Eigen::Vector2d(sums.normal[2][0], sums.normal[2][1]));
   }
 

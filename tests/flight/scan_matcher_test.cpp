@@ -257,6 +257,19 @@ TEST(ScanMatcher, KnownMotionIsTakenOutOfTheSweep) {
   }
 }
 
+TEST(ScanMatcher, AMotionThatCannotBeIsARejection) {
+  SimulatedLidar lidar(kSquare, exact(), 1);
+  ScanMatcher matcher(kSquare);
+  const Scan scan = lidar.sweep({{0.1, 0.1}, {}});
+  for (const double speed : {300.0, 1e30, 1e300}) {
+    const Match match = matcher.match(scan, {}, {}, {0.02, {speed, -speed}, speed, speed});
+    EXPECT_FALSE(match.accepted);
+    EXPECT_TRUE(match.position_m.allFinite());
+    EXPECT_TRUE(matcher.moved_per_roll_m().allFinite());
+  }
+  EXPECT_TRUE(matcher.match(scan, {}).accepted) << "as laid out again";
+}
+
 TEST(ScanMatcher, SaysHowItMovesWithTheAttitudesError) {
   for (const Section& given : sections()) {
     SCOPED_TRACE(given.name);
