@@ -64,14 +64,16 @@ class Search {
   bool add_best_curve();
   /// A name whose work a curve does as well was the wrong name for that curve.
   void drop_what_a_curve_replaces();
-  /// Whether the newest curve, over a covariate of this effect, does more than the effect: then the effect
-  /// was only the curve's straight part.
+  /// Whether the newest curve, over a covariate of this effect, has more of the effect's size than its
+  /// formula may leave: then the effect was only the curve's straight part.
   bool outshone_by_curve(const Term& term) const;
   void add_curve(const Curve& curve, double p);
   /// Whether a curve over the same covariate and rotor is in.
   bool is_described(const Curve& curve) const;
-  /// Drops accepted effect t, and gives the newest curve the straight part that no name takes any more.
-  void give_way_to_curve(std::size_t t);
+  /// Takes accepted effect t out; `without` is the fit without it.
+  void drop(std::size_t t, const JointFit& without);
+  /// The same, and gives the newest curve the straight part that no name takes any more.
+  void give_way_to_curve(std::size_t t, const JointFit& without);
   /// Effects whose own covariate bends away from their formula give way to a curve.
   void doubt_formulas();
   bool session_scatter_is_large() const;

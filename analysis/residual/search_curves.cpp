@@ -97,7 +97,7 @@ void Search::doubt_formulas() {
       const JointFit before = fit_;
       add_curve(bend, p);
       if (outshone_by_curve(term)) {
-        give_way_to_curve(t);
+        give_way_to_curve(t, fit_without(t));
         break;
       }
       result_.curves.pop_back();
@@ -114,21 +114,23 @@ void Search::drop_what_a_curve_replaces() {
     const JointFit without = fit_without(t);
     const double ratio = std::max(0.0, fit_.variances.log_likelihood - without.variances.log_likelihood);
     if (ratio_p(ratio, fit_) < kKeptP && !at_bound(fit_, result_.accepted[t].term) && !outshone) continue;
-    if (outshone) {
-      give_way_to_curve(t);
-    } else {
-      result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
-      fit_ = without;
-      read_back_terms();
-    }
+    if (outshone)
+      give_way_to_curve(t, without);
+    else
+      drop(t, without);
   }
 }
 
-void Search::give_way_to_curve(std::size_t t) {
+void Search::drop(std::size_t t, const JointFit& without) {
+  result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
+  fit_ = without;
+  read_back_terms();
+}
+
+void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
   FoundCurve& found = result_.curves.back();
   found.instead_of.push_back(result_.accepted[t].term.effect->name);
-  fit_ = fit_without(t);
-  result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
+  drop(t, without);
   found.curve = with_trend(found.curve);
   fit_.model.curves.back() = found.curve;
   fit_ = fit_jointly(observations_, fit_.model, rows_);

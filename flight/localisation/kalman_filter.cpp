@@ -7,29 +7,26 @@ namespace {
 
 using Square = Eigen::Matrix2d;
 
-Belief<4> kinematic_start(const Eigen::Vector2d& position_m, const StartSettings& start) {
-  Belief<4> belief;
-  belief.state << position_m, 0, 0;
-  belief.covariance.diagonal() << Eigen::Array2d::Constant(start.position_sigma_m).square(),
+/// At rest at a position; what a filter knows besides is left to it.
+template <int kStates>
+Belief<kStates> kinematic_start(const Eigen::Vector2d& position_m, const StartSettings& start) {
+  Belief<kStates> belief;
+  belief.state.template head<2>() = position_m;
+  belief.covariance.diagonal().template head<4>()
+      << Eigen::Array2d::Constant(start.position_sigma_m).square(),
       Eigen::Array2d::Constant(start.velocity_sigma_m_s).square();
   return belief;
 }
 
 Belief<7> inertial_start(const Eigen::Vector2d& position_m, const StartSettings& start) {
-  Belief<7> belief;
-  const Belief<4> kinematic = kinematic_start(position_m, start);
-  belief.state.head<4>() = kinematic.state;
-  belief.covariance.topLeftCorner<4, 4>() = kinematic.covariance;
+  Belief<7> belief = kinematic_start<7>(position_m, start);
   belief.covariance.diagonal().tail<3>() << start.roll_sigma_rad * start.roll_sigma_rad,
       Eigen::Array2d::Constant(start.bias_sigma_m_s2).square();
   return belief;
 }
 
 Belief<8> augmented_start(const Eigen::Vector2d& position_m, const StartSettings& start) {
-  Belief<8> belief;
-  const Belief<4> kinematic = kinematic_start(position_m, start);
-  belief.state.head<4>() = kinematic.state;
-  belief.covariance.topLeftCorner<4, 4>() = kinematic.covariance;
+  Belief<8> belief = kinematic_start<8>(position_m, start);
   belief.covariance.diagonal().tail<4>() << Eigen::Array2d::Constant(start.disturbance_sigma_m_s2).square(),
       Eigen::Array2d::Constant(start.bias_sigma_m_s2).square();
   return belief;
@@ -138,7 +135,7 @@ void AugmentedModel::step(Belief<kStates>& belief, const Input& input, double dt
 
 KalmanFilter::KalmanFilter(const Eigen::Vector2d& position_m, const KinematicModel& model,
                            const GateSettings& gate, const StartSettings& start)
-    : DelayedFilter(model, kinematic_start(position_m, start), gate) {}
+    : DelayedFilter(model, kinematic_start<4>(position_m, start), gate) {}
 
 InertialFilter::InertialFilter(const Eigen::Vector2d& position_m, const InertialModel& model,
                                const GateSettings& gate, const StartSettings& start)

@@ -86,12 +86,15 @@ Localisation::Moment Localisation::moment_ago(double ago_s) const {
 void Localisation::take_scan() {
   const double sweep_s = settings_.lidar.sweep_s;
   std::array<LidarPose, kPosesOfSweep> path;
-  for (std::size_t i = 0; i < path.size(); ++i)
-    path[i] = moment_ago(sweep_s * (1 - static_cast<double>(i) / (kPosesOfSweep - 1))).pose;
+  std::array<Attitude, kPosesOfSweep> measured;
+  for (std::size_t i = 0; i < kPosesOfSweep; ++i) {
+    const Moment moment = moment_ago(sweep_s * (1 - static_cast<double>(i) / (kPosesOfSweep - 1)));
+    path[i] = moment.pose;
+    measured[i] = moment.measured;
+  }
   scan_ = lidar_->sweep(path);
 
-  const Attitude first = moment_ago(sweep_s).measured, middle = moment_ago(0.5 * sweep_s).measured,
-                 last = moment_ago(0).measured;
+  const Attitude &first = measured.front(), &middle = measured[kPosesOfSweep / 2], &last = measured.back();
   scan_attitude_ = middle;
   if (settings_.filter == FlightFilter::inertial) {
     scan_motion_ = {.sweep_s = sweep_s,

@@ -47,7 +47,7 @@ class Localisation {
 
  private:
   static constexpr std::size_t kRemembered = 16;   // cycles of poses, longer than a sweep
-  static constexpr std::size_t kPosesOfSweep = 9;  // of the simulated sweep: about one per cycle
+  static constexpr std::size_t kPosesOfSweep = 9;  // about one per cycle; odd, so that one is the middle's
 
   struct Moment {
     LidarPose pose;     // true

@@ -133,7 +133,7 @@ TEST(KalmanFilter, ABiasItDoesNotKnowOfDoesNotCarryItAway) {
     if (i % 10 == 0) filter.correct(kNoise_m * random.vector(), noise);
     worst_m = std::max(worst_m, filter.position_m().norm());
   }
-  EXPECT_LT(worst_m, 0.07);
+  EXPECT_LT(worst_m, 0.05);
 }
 
 /// Mean NEES and NIS of a filter told the truth about its noises, over independent runs.
