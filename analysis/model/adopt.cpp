@@ -53,8 +53,7 @@ ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Obse
   result.centre.assign(result.coefficients.size(), 0);
   for (std::size_t k = 0; k < result.centre.size(); ++k) {
     double sum = 0;
-    for (Index row = 0; row < observations.rows(); ++row)
-      sum += result.column(k, curve_place(curve.shape, covariate.at(row, rotor), result.low, result.high));
+    for (Index row = 0; row < observations.rows(); ++row) sum += result.column(k, covariate.at(row, rotor));
     result.centre[k] = sum / static_cast<double>(observations.rows());
   }
   return result;

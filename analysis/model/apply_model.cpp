@@ -177,9 +177,8 @@ class Forward {
       const ModelCurve& curve = model_.curves[k];
       if (curve.rotor >= 0 && channel != curve.rotor) continue;
       const double x = std::clamp(curve_covariates_[k]->at(row, channel), curve.low, curve.high);
-      const double u = curve_place(curve.shape, x, curve.low, curve.high);
       for (std::size_t b = 0; b < curve.coefficients.size(); ++b)
-        sum += parameters(first_curve_[k] + static_cast<Index>(b)) * curve.column(b, u);
+        sum += parameters(first_curve_[k] + static_cast<Index>(b)) * curve.column(b, x);
     }
     return sum;
   }

@@ -173,9 +173,9 @@ std::string ModelTerm::label() const {
   return text;
 }
 
-double ModelCurve::column(std::size_t k, double u) const {
-  return curve_column(shape, static_cast<int>(k) + 1, u) - (tilt.empty() ? 0 : tilt[k] * (2 * u - 1)) -
-         centre[k];
+double ModelCurve::column(std::size_t k, double x) const {
+  return curve_column(shape, static_cast<int>(k) + 1, x, low, high) -
+         (tilt.empty() ? 0 : tilt[k] * curve_straight(shape, x, low, high)) - centre[k];
 }
 
 std::string ModelCurve::label() const {

@@ -26,8 +26,8 @@ struct ModelTerm {
   std::string label() const;  // "creep of rotor 2"
 };
 
-/// A curve without a name: y changes by Σ a_k (column_k(u) − tilt_k (2u − 1) − centre_k), u from 0 at `low`
-/// to 1 at `high` and held there beyond.
+/// A curve without a name: y changes by Σ a_k (column_k(x) − tilt_k s(x) − centre_k) between `low` and
+/// `high`, and is held there beyond (curve_basis.h).
 struct ModelCurve {
   std::string covariate;
   int rotor = -1;
@@ -36,7 +36,7 @@ struct ModelCurve {
   std::vector<double> coefficients, centre;
   std::vector<double> tilt = {};  // empty: none
 
-  double column(std::size_t k, double u) const;  // of the k-th coefficient, from 0, with tilt and centre
+  double column(std::size_t k, double x) const;  // of the k-th coefficient, from 0, with tilt and centre
   std::string label() const;                     // "curve over relative_humidity (empirical)"
 };
 

@@ -8,10 +8,10 @@ namespace tunnelrig {
 
 Search::Search(const Observations& observations, const std::vector<int>& rows,
                const std::vector<const Effect*>& effects, const SearchSettings& settings)
-    : observations_(observations),
+    : given_(observations),
+      observations_(observations),
       rows_(rows),
       settings_(settings),
-      mixed_(std::make_unique<MixedModel>(observations_, rows)),
       ways_(all_ways(effects, observations, rows)),
       curves_(curves_to_try(observations, rows)),
       y_(response_components(observations)) {
@@ -19,16 +19,27 @@ Search::Search(const Observations& observations, const std::vector<int>& rows,
 }
 
 Attribution Search::run() {
-  result_.baseline = fit_jointly(observations_, {}, rows_);
-  fit_ = result_.baseline;
-  result_.detectable_sigma = detectable_by_one(*mixed_, fit_.variances, settings_.alpha);
+  begin();
   add_effects();
+  if (begin_with_run_correlation()) add_effects();
   add_curves();
   find_confounded();
   result_.session_unknown = session_scatter_is_large();
   result_.final = fit_;
   result_.observations = std::move(observations_);
   return std::move(result_);
+}
+
+void Search::begin() {
+  const auto correlation = observations_.run_correlation;
+  observations_ = given_;
+  observations_.run_correlation = correlation;
+  mixed_ = std::make_unique<MixedModel>(observations_, rows_);
+  result_ = {};
+  result_.baseline = fit_jointly(observations_, {}, rows_);
+  fit_ = result_.baseline;
+  result_.detectable_sigma = detectable_by_one(*mixed_, fit_.variances, settings_.alpha);
+  critical_ = 0;
 }
 
 std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,

@@ -2,9 +2,11 @@
 #include "analysis/residual/explanation_parts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -19,7 +21,7 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
                                            const std::vector<int>& rows) {
   std::map<std::string, std::vector<Untestable>> by_name;
   std::set<std::string> testable;
-  const MixedModel mixed(observations, rows, {0});
+  const MixedModel mixed = MixedModel::baseline_alone(observations, rows);
   const MatrixXd predicted = predict_response(observations, {}, rows);
   for (const Effect* effect : effects) {
     const Testability can = testability(*effect, observations);
@@ -99,6 +101,18 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
     if (std::none_of(once.begin(), once.end(), [&](const Untestable& u) { return u.effect == entry.effect; }))
       once.push_back(entry);
   explanation.untestable = std::move(once);
+}
+
+void warn_of_run_correlation(const Observations& observations, Explanation& explanation) {
+  constexpr std::array<std::string_view, 2> kOf = {"all rotors together", "one rotor against another"};
+  for (std::size_t s = 0; s < kOf.size(); ++s) {
+    const double correlation = observations.run_correlation[s];
+    if (correlation == 0) continue;
+    explanation.warnings.push_back(
+        fmt::format("neighbouring {} resemble each other (correlation {:.2f}{}{}): allowed for",
+                    observations.channels() > 1 ? "runs" : "rows", correlation,
+                    observations.channels() > 1 ? " of " : "", observations.channels() > 1 ? kOf[s] : ""));
+  }
 }
 
 }  // namespace tunnelrig

@@ -5,14 +5,16 @@
 
 namespace tunnelrig {
 
-double curve_place(CurveShape shape, double x, double low, double high) {
-  if (shape == CurveShape::kLogParabola) return std::log(x / low) / std::log(high / low);
-  return (x - low) / (high - low);
+double curve_straight(CurveShape shape, double x, double low, double high) {
+  const bool of_logarithm = shape == CurveShape::kLogParabola || shape == CurveShape::kLevelling;
+  return 2 * (of_logarithm ? std::log(x / low) / std::log(high / low) : (x - low) / (high - low)) - 1;
 }
 
-double curve_column(CurveShape shape, int k, double u) {
-  if (shape == CurveShape::kWaves) return std::cos(std::numbers::pi * k * u);
-  return k == 1 ? (2 * u - 1) * (2 * u - 1) : 2 * u - 1;
+double curve_column(CurveShape shape, int k, double x, double low, double high) {
+  if (shape == CurveShape::kWaves) return std::cos(std::numbers::pi * k * (x - low) / (high - low));
+  const double straight = curve_straight(shape, x, low, high);
+  if (k > 1) return straight;
+  return shape == CurveShape::kLevelling ? low / x : straight * straight;
 }
 
 std::string_view name_of(CurveShape shape) {
@@ -23,12 +25,15 @@ std::string_view name_of(CurveShape shape) {
       return "parabola";
     case CurveShape::kLogParabola:
       return "log_parabola";
+    case CurveShape::kLevelling:
+      return "levelling";
   }
   return "";
 }
 
 std::optional<CurveShape> curve_shape(std::string_view name) {
-  for (const CurveShape shape : {CurveShape::kWaves, CurveShape::kParabola, CurveShape::kLogParabola})
+  for (const CurveShape shape :
+       {CurveShape::kWaves, CurveShape::kParabola, CurveShape::kLogParabola, CurveShape::kLevelling})
     if (name_of(shape) == name) return shape;
   return {};
 }

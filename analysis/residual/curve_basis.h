@@ -7,18 +7,19 @@
 namespace tunnelrig {
 
 enum class CurveShape {
-  kWaves,        // cos(π k u), k = 1 …: bends of ever shorter length
-  kParabola,     // (2u − 1)²: what a straight line lacks; 2u − 1 where it stands alone
-  kLogParabola,  // the same over the logarithm: what a power law lacks
+  kWaves,        // cos(π k u), u = (x − low)/(high − low), k = 1 …: bends of ever shorter length
+  kParabola,     // s², s = 2u − 1: what a straight line lacks; s where it stands alone
+  kLogParabola,  // the same over ln x: what a power law lacks
+  kLevelling,    // low/x, with s of ln x: the same, but less and less where x grows
 };
 
-/// u: 0 at `low`, 1 at `high`, beyond them outside.
-double curve_place(CurveShape shape, double x, double low, double high);
+/// s: −1 at `low`, 1 at `high`, beyond them outside.
+double curve_straight(CurveShape shape, double x, double low, double high);
 
-/// The k-th column (from 1) at u.
-double curve_column(CurveShape shape, int k, double u);
+/// The k-th column (from 1) at x.
+double curve_column(CurveShape shape, int k, double x, double low, double high);
 
-/// "waves", "parabola", "log_parabola".
+/// "waves", "parabola", "log_parabola", "levelling".
 std::string_view name_of(CurveShape shape);
 std::optional<CurveShape> curve_shape(std::string_view name);
 

@@ -30,8 +30,7 @@ std::vector<Components> columns_over(const Observations& observations, const Cov
     for (Index row = 0; row < observations.rows(); ++row)
       for (Index channel = 0; channel < observations.channels(); ++channel)
         if (rotor < 0 || channel == rotor)
-          columns.back()[0](row, channel) =
-              curve_column(shape, k, curve_place(shape, covariate.at(row, channel), low, high));
+          columns.back()[0](row, channel) = curve_column(shape, k, covariate.at(row, channel), low, high);
   }
   return columns;
 }
@@ -46,11 +45,12 @@ std::vector<Components> course(const Observations& observations, int rotor) {
   return columns;
 }
 
-/// Over the logarithm where the covariate is a ratio: then a power law is what is straight.
-CurveShape parabola_over(const Observations& observations, const Covariate& covariate) {
+/// Where the covariate is a ratio a power law is what is straight.
+std::vector<CurveShape> bends_over(const Observations& observations, const Covariate& covariate) {
   const bool ratio = observations.multiplicative && !covariate.derived && !covariate.name.ends_with("_C") &&
                      covariate.value.minCoeff() > 0;
-  return ratio ? CurveShape::kLogParabola : CurveShape::kParabola;
+  if (ratio) return {CurveShape::kLogParabola, CurveShape::kLevelling};
+  return {CurveShape::kParabola};
 }
 
 int different_values(const Covariate& covariate, const std::vector<int>& rows) {
@@ -59,7 +59,7 @@ int different_values(const Covariate& covariate, const std::vector<int>& rows) {
   return static_cast<int>(values.size());
 }
 
-/// 2u − 1, on the curve's rotors.
+/// What is straight, on the curve's rotors.
 MatrixXd straight_over(const Curve& curve) {
   const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
   const MatrixXd& column = curve.columns[0][0];
@@ -67,8 +67,7 @@ MatrixXd straight_over(const Curve& curve) {
   for (Index row = 0; row < straight.rows(); ++row)
     for (Index c = 0; c < straight.cols(); ++c)
       if (straight.cols() == 1 || curve.rotor < 0 || c == curve.rotor)
-        straight(row, c) =
-            2 * curve_place(curve.shape, curve.x(row, curve.x.cols() > 1 ? c : 0), low, high) - 1;
+        straight(row, c) = curve_straight(curve.shape, curve.x(row, curve.x.cols() > 1 ? c : 0), low, high);
   return straight;
 }
 
@@ -100,7 +99,8 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
                           .columns = columns_over(observations, covariate, rotor, shape, count),
                           .x = covariate.value});
     };
-    if (most >= 1) add(parabola_over(observations, covariate), 1);
+    if (most >= 1)
+      for (const CurveShape bend : bends_over(observations, covariate)) add(bend, 1);
     for (const int count : kBends)
       if (count <= most) add(CurveShape::kWaves, count);
   }
@@ -145,6 +145,10 @@ Curve with_trend(const Curve& curve) {
   return result;
 }
 
-Candidate as_candidate(const Curve& curve) { return {.columns = curve.columns, .sign = 0, .weight = 1}; }
+Candidate as_candidate(const Curve& curve) {
+  // Rotors alone are as likely together as all of them alike, as with named effects.
+  const auto channels = static_cast<double>(curve.columns[0][0].cols());
+  return {.columns = curve.columns, .sign = 0, .weight = curve.rotor < 0 ? 1 : 1 / channels};
+}
 
 }  // namespace tunnelrig

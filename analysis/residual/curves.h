@@ -17,13 +17,13 @@ struct Curve {
   int rotor = -1;
   CurveShape shape = CurveShape::kWaves;
   std::vector<Components> columns;
-  std::vector<double> tilt = {};  // of each column: what was taken out of it of 2u − 1; empty: nothing
+  std::vector<double> tilt = {};  // of each column: what was taken out of it of s; empty: nothing
   Eigen::MatrixXd x;              // n × 1 or n × c: what it is drawn against; empty for time_in_run
 
   std::string label() const;
 };
 
-/// Curves over everything that is known of the runs: a parabola beside whatever trend has a name, and waves.
+/// Curves over everything that is known of the runs: a bend beside whatever trend has a name, and waves.
 /// `rows` decide how many bends a covariate can show: one for every three different values, at most six.
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows);
 

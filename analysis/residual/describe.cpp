@@ -35,11 +35,11 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
     const double u = static_cast<double>(p) / (kPoints - 1);
     VectorXd basis(k);
     const double x = low + u * (high - low);
-    const double place = within ? u : curve_place(found.curve.shape, x, low, high);
     for (Index b = 0; b < k; ++b)
-      basis(b) =
-          curve_column(found.curve.shape, static_cast<int>(b) + 1, place) -
-          (found.curve.tilt.empty() ? 0 : found.curve.tilt[static_cast<std::size_t>(b)] * (2 * place - 1));
+      basis(b) = curve_column(found.curve.shape, static_cast<int>(b) + 1, x, low, high) -
+                 (found.curve.tilt.empty() ? 0
+                                           : found.curve.tilt[static_cast<std::size_t>(b)] *
+                                                 curve_straight(found.curve.shape, x, low, high));
     const double value = scale * basis.dot(amplitude),
                  half = 1.96 * scale * std::sqrt(std::max(0.0, basis.dot(covariance * basis)));
     result.shape.push_back({x, value, value - half, value + half});

@@ -132,6 +132,11 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   for (const std::string& group : seal.only_sealed)
     explanation.warnings.push_back(group + " has runs in sealed blocks only: it is not scored");
   const Attribution found = attribute(observations, seal.open, effects, settings);
+  const Observations& wide = found.observations;
+  Observations alone =
+      observations;  // without what groups have of their own: what the baseline is held against
+  alone.run_correlation = wide.run_correlation;
+  warn_of_run_correlation(wide, explanation);
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
   explanation.detectable = found.detectable_sigma * scale_of(observations);
@@ -144,25 +149,24 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
       explanation.empirical.push_back(found_curve.curve.label());
   if (!found.curves.empty() && !settings.empirical)
     named = found.accepted.empty() ? found.baseline : without_curves(found, seal.open);
-  const HeldOutErrors before = score(observations, found.baseline, named.variances, seal.open, seal.sealed);
-  const Observations& wide = found.observations;
+  const HeldOutErrors before = score(alone, found.baseline, named.variances, seal.open, seal.sealed);
   const HeldOutErrors after = score(wide, named, named.variances, seal.open, seal.sealed);
   set_interval(observations, before, settings.seed, explanation.before);
   set_interval(observations, after, settings.seed, explanation.after);
   explanation.noise_floor =
       rms(score(wide, found.final, found.final.variances, seal.open, seal.sealed).expected_std);
-  explanation.before.rmse = rms(residuals(observations, found.baseline, seal.open));
+  explanation.before.rmse = rms(residuals(alone, found.baseline, seal.open));
   explanation.after.rmse = rms(residuals(wide, named, seal.open));
 
   settings.progress("estimating parameters");
   const JointFit whole = fit_jointly(wide, found.final.model, rows);
-  const JointFit whole_baseline = fit_jointly(observations, {}, rows);
+  const JointFit whole_baseline = fit_jointly(alone, {}, rows);
   for (const Accepted& accepted : found.accepted)
     if (at_bound(whole, accepted.term))
       explanation.warnings.push_back(fmt::format(
           "with the sealed blocks in, {} goes to its physical bound: doubt it", accepted.term.label()));
   explanation.model = whole.model;
-  explanation.residual_before = residuals(observations, whole_baseline, rows);
+  explanation.residual_before = residuals(alone, whole_baseline, rows);
   const HeldOutErrors fitted = score(wide, whole, whole.variances, rows, rows);
   explanation.residual_after = fitted.error;
   report_adopted(wide, found, whole, rows, explanation);

@@ -124,7 +124,7 @@ class Page {
 
   /// The part of what a term adds to y that a residual shows: without what the baseline can absorb.
   MatrixXd visible(const MatrixXd& added) const {
-    const MixedModel mixed(observations_, rows_, {0});
+    const MixedModel mixed = MixedModel::baseline_alone(observations_, rows_);
     Components components(1 + observations_.shape.size(), MatrixXd::Zero(added.rows(), added.cols()));
     components[0] = added;
     MatrixXd by_mode = MatrixXd::Zero(added.rows(), added.cols());

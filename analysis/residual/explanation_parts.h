@@ -19,6 +19,9 @@ void warn_of_constant(const Observations& observations, Explanation& explanation
 /// Pairs of covariates that no campaign of this design can tell apart.
 void warn_of_collinear(const Observations& observations, Explanation& explanation);
 
+/// Neighbouring runs that resemble each other, as the search found and allowed for.
+void warn_of_run_correlation(const Observations& observations, Explanation& explanation);
+
 // --- estimates.cpp
 
 /// Interval of a root mean square whose blocks are resampled; Student's t for their number, on the logarithm.

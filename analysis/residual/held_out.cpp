@@ -68,20 +68,17 @@ void own_constants(const Observations& observations, const std::vector<int>& row
   }
 }
 
-/// V^(−½)e of one stratum, block by block; V = σ²(I + a 11ᵀ). Missing errors count as none.
+/// V^(−½)e of one stratum. Missing errors count as none.
 VectorXd whitened(const Observations& observations, const std::vector<int>& rows, const MatrixXd& error,
-                  double sigma, double ratio) {
+                  double sigma, double ratio, double run_correlation) {
   MatrixXd result = error.array().isNaN().select(0, error);
-  std::map<int, std::vector<Index>> blocks;
+  std::map<int, std::vector<Index>> of_block;
   for (std::size_t r = 0; r < rows.size(); ++r)
     if (!std::isnan(error(static_cast<Index>(r), 0)))
-      blocks[observations.block[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
-  for (const auto& [block, runs] : blocks) {
-    const double n = static_cast<double>(runs.size());
-    const Eigen::RowVectorXd share =
-        (1 - 1 / std::sqrt(1 + ratio * n)) * MatrixXd(result(runs, Eigen::all)).colwise().mean();
-    for (const Index run : runs) result.row(run) -= share;
-  }
+      of_block[observations.block[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
+  std::vector<std::vector<Index>> blocks;
+  for (auto& [block, runs] : of_block) blocks.push_back(std::move(runs));
+  whiten(blocks, ratio, run_correlation, result);
   return result.reshaped() / std::max(sigma, 1e-150);
 }
 
@@ -116,7 +113,7 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
                                const std::vector<Components>& columns, const NullFit& null,
                                const std::vector<int>& fit_rows, const std::vector<int>& test_rows) {
   const MixedModel model(observations, fit_rows, null.ratio);
-  const MixedModel test(observations, test_rows, {0});
+  const MixedModel test = MixedModel::baseline_alone(observations, test_rows);
   std::vector<const Components*> items;
   for (const Components& column : columns) items.push_back(&column);
   const Fit fit = fit_amplitudes(model, y, items, null);
@@ -144,7 +141,8 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     if (stratum.means() && observations.groups_within_blocks)
       own_constants(observations, test_rows, Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes),
                     sigma2, errors, variances);
-    parts.push_back(whitened(observations, test_rows, errors, null.sigma[s], kRatios[null.ratio[s]]));
+    parts.push_back(whitened(observations, test_rows, errors, null.sigma[s], kRatios[null.ratio[s]],
+                             model.run_correlation(s)));
     if (!stratum.means()) continue;
     error_by_mode.middleCols(stratum.first_mode, stratum.modes) = errors;
     variance_by_mode.middleCols(stratum.first_mode, stratum.modes) = variances;

@@ -333,9 +333,8 @@ std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::si
                                                  null.ratio_probability[s].end());
     std::vector<std::size_t> ratio(count);
     for (std::size_t& r : ratio) r = draw(random);
-    const double correlation = null.run_correlation.empty() ? 0 : null.run_correlation[s];
-    data.push_back(
-        impl_->model.simulate(s, std::vector<double>(count, null.sigma[s]), ratio, correlation, random));
+    data.push_back(impl_->model.simulate(s, std::vector<double>(count, null.sigma[s]), ratio,
+                                         impl_->model.run_correlation(s), random));
   }
   const Impl::Data products = impl_->multiply_data(data);
   std::vector<double> maxima(count, 0.0);

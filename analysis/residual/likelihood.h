@@ -22,8 +22,6 @@ struct NullFit {
   std::vector<double> sigma;       // run scatter of each stratum, in y; what the columns cost is allowed for
   std::vector<std::vector<double>> ratio_probability;  // likelihood of each ratio, normalised
   double log_likelihood = 0;
-  /// Of neighbouring runs, for each stratum, in data that are drawn; empty: independent (run_correlation.h).
-  std::vector<double> run_correlation = {};
 };
 
 /// A candidate on one data set.

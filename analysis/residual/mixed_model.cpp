@@ -24,11 +24,41 @@ MatrixXd orthonormal_modes(Index channels) {
 
 }  // namespace
 
+void whiten(const std::vector<std::vector<Index>>& blocks, double session_ratio, double run_correlation,
+            Eigen::Ref<MatrixXd> columns) {
+  // Φ^(−½) takes from each run what the one before it foretells, and makes a block's 1 to (1, w, w, …).
+  const double scale = 1 / std::sqrt(1 - run_correlation * run_correlation);
+  const double w = run_correlation == 0 ? 1 : (1 - run_correlation) * scale;
+  Eigen::RowVectorXd mean(columns.cols());
+  for (const auto& runs : blocks) {
+    if (run_correlation != 0)
+      for (std::size_t k = runs.size() - 1; k > 0; --k)
+        columns.row(runs[k]) = scale * (columns.row(runs[k]) - run_correlation * columns.row(runs[k - 1]));
+    if (session_ratio == 0) continue;
+    const double n = 1 + w * w * static_cast<double>(runs.size() - 1);
+    const double share = (1 - 1 / std::sqrt(1 + session_ratio * n)) / n;
+    mean = columns.row(runs[0]);
+    for (std::size_t k = 1; k < runs.size(); ++k) mean += w * columns.row(runs[k]);
+    mean *= share;
+    columns.row(runs[0]) -= mean;
+    for (std::size_t k = 1; k < runs.size(); ++k) columns.row(runs[k]) -= w * mean;
+  }
+}
+
 MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
                        const std::vector<std::size_t>& ratio)
+    : MixedModel(observations, std::move(rows), ratio, observations.run_correlation) {}
+
+MixedModel MixedModel::baseline_alone(const Observations& observations, std::vector<int> rows) {
+  return {observations, std::move(rows), {0}, {0, 0}};
+}
+
+MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
+                       const std::vector<std::size_t>& ratio, const std::array<double, 2>& run_correlation)
     : observations_(observations),
       rows_(std::move(rows)),
-      modes_(orthonormal_modes(observations.channels())) {
+      modes_(orthonormal_modes(observations.channels())),
+      run_correlation_(run_correlation) {
   if (modes_(0, 0) < 0) modes_ *= -1;
   for (std::size_t component = 0; component <= observations.shape.size(); ++component) {
     strata_.push_back({component, 0, 1});
@@ -41,9 +71,23 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
   }
   if (observations.blocks_are_rows) ratios_ = 1;
   for (auto& [block, runs] : blocks) blocks_.push_back(std::move(runs));
-  prepared_.resize(ratios_);
-  for (std::size_t r = 0; r < ratios_; ++r)
-    if (ratio.empty() || std::find(ratio.begin(), ratio.end(), r) != ratio.end()) prepare(r);
+  const bool alike =
+      strata_.size() == 1 + observations.shape.size() || run_correlation_[0] == run_correlation_[1];
+  for (std::size_t s = 0; s < (alike ? 1U : 2U); ++s) {
+    prepared_[s].resize(ratios_);
+    for (std::size_t r = 0; r < ratios_; ++r)
+      if (ratio.empty() || std::find(ratio.begin(), ratio.end(), r) != ratio.end())
+        prepared_[s][r] = prepare(r, run_correlation_[s]);
+  }
+}
+
+double MixedModel::run_correlation(std::size_t stratum) const {
+  return strata_[stratum].means() ? run_correlation_[strata_[stratum].first_mode == 0 ? 0 : 1] : 0;
+}
+
+const MixedModel::Prepared& MixedModel::prepared(std::size_t stratum, std::size_t ratio) const {
+  const std::size_t own = strata_[stratum].first_mode == 0 || prepared_[1].empty() ? 0 : 1;
+  return prepared_[own][ratio];
 }
 
 MatrixXd MixedModel::baseline_of(const std::vector<int>& rows, const std::vector<int>& groups) const {
@@ -65,12 +109,13 @@ MatrixXd MixedModel::baseline_of(const std::vector<int>& rows, const std::vector
   return baseline;
 }
 
-MixedModel::Part MixedModel::decompose(std::size_t ratio, std::vector<Index> runs,
+MixedModel::Part MixedModel::decompose(std::size_t ratio, double run_correlation, std::vector<Index> runs,
                                        std::vector<int> groups) const {
   std::vector<int> rows;
   for (const Index run : runs) rows.push_back(rows_[static_cast<std::size_t>(run)]);
   MatrixXd baseline = baseline_of(rows, groups);
-  if (ratio > 0) whiten(ratio, baseline);  // then the part holds all runs
+  if (ratio > 0 || run_correlation != 0)  // then the part holds all runs
+    whiten(blocks_, kRatios[ratio], run_correlation, baseline);
   Part part{.runs = std::move(runs),
             .groups = std::move(groups),
             .qr = baseline.colPivHouseholderQr(),
@@ -80,27 +125,27 @@ MixedModel::Part MixedModel::decompose(std::size_t ratio, std::vector<Index> run
   return part;
 }
 
-void MixedModel::prepare(std::size_t ratio) {
+MixedModel::Prepared MixedModel::prepare(std::size_t ratio, double run_correlation) {
   std::map<int, std::vector<Index>> runs_of_group;
   for (std::size_t r = 0; r < rows_.size(); ++r)
     runs_of_group[observations_.group[static_cast<std::size_t>(rows_[r])]].push_back(static_cast<Index>(r));
-  Prepared& prepared = prepared_[ratio];
-  if (ratio == 0) {  // without sessions, each group stands for itself: small systems instead of one large one
-    for (const auto& [group, runs] : runs_of_group) prepared.parts.push_back(decompose(ratio, runs, {group}));
+  Prepared prepared;
+  if (ratio == 0 && run_correlation == 0) {  // each group stands for itself: small systems, not one large one
+    for (const auto& [group, runs] : runs_of_group)
+      prepared.parts.push_back(decompose(ratio, run_correlation, runs, {group}));
   } else {
     std::vector<Index> all(rows_.size());
     std::iota(all.begin(), all.end(), Index{0});
     std::vector<int> groups;
     for (const auto& [group, runs] : runs_of_group) groups.push_back(group);
-    prepared.parts.push_back(decompose(ratio, std::move(all), std::move(groups)));
+    prepared.parts.push_back(decompose(ratio, run_correlation, std::move(all), std::move(groups)));
   }
   baseline_columns_ = 0;
   for (const Part& part : prepared.parts) {
     baseline_columns_ += part.basis.cols();
     prepared.log_xvx += 2 * part.qr.matrixQR().diagonal().head(part.basis.cols()).array().abs().log().sum();
   }
-  for (const auto& runs : blocks_)
-    prepared.log_v += std::log1p(kRatios[ratio] * static_cast<double>(runs.size()));
+  return prepared;
 }
 
 std::vector<Index> MixedModel::rows_of(const Part& part, const std::vector<int>& rows) const {
@@ -112,28 +157,21 @@ std::vector<Index> MixedModel::rows_of(const Part& part, const std::vector<int>&
   return result;
 }
 
-/// V^(−½) block by block: I − (1 − 1/√(1 + a n)) 11ᵀ/n.
-void MixedModel::whiten(std::size_t ratio, Eigen::Ref<MatrixXd> columns) const {
-  if (kRatios[ratio] == 0) return;
-  Eigen::RowVectorXd mean(columns.cols());
-  for (const auto& runs : blocks_) {
-    const double n = static_cast<double>(runs.size());
-    const double share = 1 - 1 / std::sqrt(1 + kRatios[ratio] * n);
-    mean.setZero();
-    for (const Index run : runs) mean += columns.row(run);
-    mean *= share / n;
-    for (const Index run : runs) columns.row(run) -= mean;
-  }
-}
-
 Index MixedModel::dof(std::size_t stratum) const {
   const Index runs = static_cast<Index>(rows_.size()) - (strata_[stratum].means() ? baseline_columns_ : 0);
   return runs * strata_[stratum].modes;
 }
 
 double MixedModel::log_determinant(std::size_t stratum, std::size_t ratio) const {
-  const double one_mode = prepared_[ratio].log_v + (strata_[stratum].means() ? prepared_[ratio].log_xvx : 0);
-  return 0.5 * strata_[stratum].modes * one_mode;
+  const double correlation = run_correlation(stratum), less = 1 - correlation * correlation;
+  const double w2 = (1 - correlation) * (1 - correlation) / less;
+  double log_v = 0;
+  for (const auto& runs : blocks_) {
+    const auto after_first = static_cast<double>(runs.size() - 1);
+    log_v += after_first * std::log(less) + std::log1p(kRatios[ratio] * (1 + w2 * after_first));
+  }
+  return 0.5 * strata_[stratum].modes *
+         (log_v + (strata_[stratum].means() ? prepared(stratum, ratio).log_xvx : 0));
 }
 
 Stacked MixedModel::stack(std::size_t stratum, const std::vector<const Components*>& items) const {
@@ -151,9 +189,9 @@ Stacked MixedModel::stack(std::size_t stratum, const std::vector<const Component
 void MixedModel::project(std::size_t stratum, std::size_t ratio, Stacked& columns) const {
   const Index n = static_cast<Index>(rows_.size());
   Eigen::Map<MatrixXd> by_mode(columns.data(), n, columns.size() / n);
-  whiten(ratio, by_mode);
+  whiten(blocks_, kRatios[ratio], run_correlation(stratum), by_mode);
   if (!strata_[stratum].means()) return;
-  const auto& parts = prepared_[ratio].parts;
+  const auto& parts = prepared(stratum, ratio).parts;
   if (parts.size() == 1) {
     by_mode.noalias() -= parts[0].basis * (parts[0].basis.transpose() * by_mode);
     return;
@@ -172,9 +210,9 @@ Stacked MixedModel::baseline_prediction(std::size_t stratum, std::size_t ratio, 
   if (!strata_[stratum].means()) return result;
   result.setConstant(std::numeric_limits<double>::quiet_NaN());
   MatrixXd by_mode = Eigen::Map<const MatrixXd>(columns.data(), n, modes * columns.cols());
-  whiten(ratio, by_mode);
+  whiten(blocks_, kRatios[ratio], run_correlation(stratum), by_mode);
   Eigen::Map<MatrixXd> predicted(result.data(), wanted, modes * columns.cols());
-  for (const Part& part : prepared_[ratio].parts) {
+  for (const Part& part : prepared(stratum, ratio).parts) {
     const std::vector<Index> where = rows_of(part, rows);
     if (where.empty()) continue;
     std::vector<int> asked;
@@ -190,7 +228,7 @@ Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t r
   if (!strata_[stratum].means()) return Eigen::VectorXd::Zero(static_cast<Index>(rows.size()));
   Eigen::VectorXd result =
       Eigen::VectorXd::Constant(static_cast<Index>(rows.size()), std::numeric_limits<double>::quiet_NaN());
-  for (const Part& part : prepared_[ratio].parts) {
+  for (const Part& part : prepared(stratum, ratio).parts) {
     const std::vector<Index> where = rows_of(part, rows);
     if (where.empty()) continue;
     std::vector<int> asked;

@@ -4,7 +4,8 @@
 //
 // The rotors' y are rotated into one common and c − 1 difference modes; the runs' means and each cosine
 // coefficient of their course, common or difference, make a stratum with a run variance σ² and a session
-// variance a σ² of its own. docs/closed-loop.md has the equations.
+// variance a σ² of its own. A run's mean may be correlated with that of the run before it by φ:
+// V = σ² (Φ + a 11ᵀ) in each session, Φ_ij = φ^|i − j|. docs/closed-loop.md has the equations.
 #pragma once
 
 #include "analysis/residual/terms.h"
@@ -25,7 +26,12 @@ inline constexpr std::array<double, 9> kRatios = {0, 0.05, 0.15, 0.4, 1, 2.5, 6,
 /// Columns, each stacked over the modes of one stratum: (runs · modes) × columns.
 using Stacked = Eigen::MatrixXd;
 
-/// What is fixed by the design alone: for some runs of some observations.
+/// (Φ + a 11ᵀ)^(−½), by which columns (a row for each run) are multiplied in place, block by block; the runs
+/// of a block in order of time.
+void whiten(const std::vector<std::vector<Eigen::Index>>& blocks, double session_ratio,
+            double run_correlation, Eigen::Ref<Eigen::MatrixXd> columns);
+
+/// What is fixed by the design and the correlation of neighbouring runs: for some runs of some observations.
 class MixedModel {
  public:
   struct Stratum {
@@ -38,13 +44,17 @@ class MixedModel {
   MixedModel(const Observations& observations, std::vector<int> rows,
              const std::vector<std::size_t>& ratio = {});
 
+  /// Runs of one variance, independent of each other: only to take out what the baseline can absorb.
+  static MixedModel baseline_alone(const Observations& observations, std::vector<int> rows);
+
   const std::vector<int>& rows() const { return rows_; }
   const std::vector<std::vector<Eigen::Index>>& blocks() const { return blocks_; }  // positions in rows()
   const std::vector<Stratum>& strata() const { return strata_; }
   Eigen::Index dof(std::size_t stratum) const;  // runs · modes less the baseline's
   double log_determinant(std::size_t stratum,
-                         std::size_t ratio) const;  // restricted likelihood's constant, ½ log(…)
-  std::size_t ratios() const { return ratios_; }    // 1 where blocks are single rows
+                         std::size_t ratio) const;    // restricted likelihood's constant, ½ log(…)
+  std::size_t ratios() const { return ratios_; }      // 1 where blocks are single rows
+  double run_correlation(std::size_t stratum) const;  // 0 for courses
 
   /// Picks the model's runs and rotates the rotors into modes; one item per column of the result.
   Stacked stack(std::size_t stratum, const std::vector<const Components*>& items) const;
@@ -62,8 +72,8 @@ class MixedModel {
   Eigen::VectorXd baseline_variance(std::size_t stratum, std::size_t ratio,
                                     const std::vector<int>& rows) const;
 
-  /// Draws data without any effect: session and run scatter of the given σ and ratio, a run's scatter
-  /// correlated with that of the run before in its block. Stacked, a column for each σ.
+  /// Draws data without any effect: session and run scatter of the given σ and ratio, and a correlation of
+  /// neighbouring runs. Stacked, a column for each σ.
   Stacked simulate(std::size_t stratum, const std::vector<double>& sigma,
                    const std::vector<std::size_t>& ratio, double run_correlation,
                    std::mt19937_64& random) const;
@@ -82,17 +92,21 @@ class MixedModel {
   };
   struct Prepared {
     std::vector<Part> parts;
-    double log_v = 0, log_xvx = 0;  // log|V|, log|LᵀV⁻¹L|
+    double log_xvx = 0;  // log|LᵀV⁻¹L|
   };
 
-  void prepare(std::size_t ratio);
-  Part decompose(std::size_t ratio, std::vector<Eigen::Index> runs, std::vector<int> groups) const;
+  MixedModel(const Observations& observations, std::vector<int> rows, const std::vector<std::size_t>& ratio,
+             const std::array<double, 2>& run_correlation);
+  /// Of a stratum of runs' means: their baseline.
+  const Prepared& prepared(std::size_t stratum, std::size_t ratio) const;
+  Prepared prepare(std::size_t ratio, double run_correlation);
+  Part decompose(std::size_t ratio, double run_correlation, std::vector<Eigen::Index> runs,
+                 std::vector<int> groups) const;
   /// Baseline columns of runs: a constant and the slopes for each of `groups`; NaN where the group is not
   /// among them.
   Eigen::MatrixXd baseline_of(const std::vector<int>& rows, const std::vector<int>& groups) const;
   /// Rows of `rows` that a part speaks for.
   std::vector<Eigen::Index> rows_of(const Part& part, const std::vector<int>& rows) const;
-  void whiten(std::size_t ratio, Eigen::Ref<Eigen::MatrixXd> columns) const;
 
   const Observations& observations_;
   std::vector<int> rows_;
@@ -100,8 +114,10 @@ class MixedModel {
   Eigen::MatrixXd modes_;
   std::vector<Stratum> strata_;
   std::size_t ratios_ = kRatios.size();
+  std::array<double, 2> run_correlation_ = {0, 0};
   Eigen::Index baseline_columns_ = 0;
-  std::vector<Prepared> prepared_;  // by ratio
+  /// By ratio; of the rotors' differences only where their runs are correlated otherwise than the means.
+  std::array<std::vector<Prepared>, 2> prepared_;
 };
 
 }  // namespace tunnelrig

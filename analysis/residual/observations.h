@@ -5,6 +5,7 @@
 #include "analysis/campaign_data.h"
 #include "datasets/observations.h"
 
+#include <array>
 #include <map>
 #include <string>
 #include <vector>
@@ -52,6 +53,9 @@ struct Observations {
   bool coefficient = false;  // the response is a thrust coefficient, or is made one by its measured speed
   bool groups_within_blocks =
       false;  // the block is the group: its baseline is estimated anew where it is held out
+  /// Of the scatter of neighbouring runs of a block: what rotors have in common, what they differ by. Not
+  /// known before the search has found it (run_correlation.h).
+  std::array<double, 2> run_correlation = {0, 0};
 
   Eigen::VectorXd newtons_per_volt;  // c
   Rig rig;

@@ -44,13 +44,13 @@ Spread simulated(const MixedModel& model, const NullFit& fit, std::size_t stratu
 
 }  // namespace
 
-std::vector<double> run_correlation(const MixedModel& model, const NullFit& fit, const Components& residual,
-                                    std::mt19937_64& random) {
-  std::vector<double> result(model.strata().size(), 0.0);
+std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fit, const Components& residual,
+                                      std::mt19937_64& random) {
+  std::array<double, 2> result = {0, 0};
   const bool neighbours = std::any_of(model.blocks().begin(), model.blocks().end(),
                                       [](const auto& runs) { return runs.size() > 1; });
   if (!neighbours) return result;
-  for (std::size_t s = 0; s < result.size(); ++s) {
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
     if (!model.strata()[s].means()) continue;
     Stacked column = model.stack(s, {&residual});
     model.project(s, fit.ratio[s], column);
@@ -58,7 +58,8 @@ std::vector<double> run_correlation(const MixedModel& model, const NullFit& fit,
     const Spread none = simulated(model, fit, s, 0, random);
     if (seen < none.mean + 2 * none.deviation) continue;
     const Spread known = simulated(model, fit, s, kKnown, random);
-    result[s] = std::clamp(kKnown * (seen - none.mean) / (known.mean - none.mean), 0.0, kMost);
+    result[model.strata()[s].first_mode == 0 ? 0 : 1] =
+        std::clamp(kKnown * (seen - none.mean) / (known.mean - none.mean), 0.0, kMost);
   }
   return result;
 }

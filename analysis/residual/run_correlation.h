@@ -3,16 +3,17 @@
 
 #include "analysis/residual/likelihood.h"
 
+#include <array>
 #include <random>
-#include <vector>
 
 namespace tunnelrig {
 
-/// For each stratum of runs' means, the correlation of neighbouring runs within their blocks (order of rows
-/// is order of time) in residuals of a fitted model; 0 where it is within two standard deviations of what
-/// independent runs show, and for courses. What the baseline takes from the residuals, and with it their
-/// correlation, is allowed for by simulation: data of known correlation go the same way.
-std::vector<double> run_correlation(const MixedModel& model, const NullFit& fit, const Components& residual,
-                                    std::mt19937_64& random);
+/// Of what rotors have in common, and of what they differ by: the correlation of neighbouring runs within
+/// their blocks (order of rows is order of time) in residuals of a model that was fitted without any; 0 where
+/// it is within two standard deviations of what independent runs show. What the baseline takes from the
+/// residuals, and with it their correlation, is allowed for by simulation: data of known correlation go the
+/// same way.
+std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fit, const Components& residual,
+                                      std::mt19937_64& random);
 
 }  // namespace tunnelrig

@@ -6,6 +6,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,6 +30,9 @@ class Search {
     std::vector<std::size_t> order;  // by evidence, best first
   };
 
+  /// The model without any effect; what was found before is forgotten.
+  void begin();
+
   // named effects: search_effects.cpp
   void add_effects();
   bool already_in(const Term& way) const;
@@ -42,6 +46,11 @@ class Search {
   std::vector<Ranked> ranking(const Scan& scan, NullMaxima& maxima) const;
   /// The best candidate whose parameters stay within physics and which predicts blocks that it has not seen.
   bool accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round);
+  /// The covariate that an effect shares with an accepted one, if a bend over it predicts unseen blocks about
+  /// as well: what two names over one covariate do together, a curve does too, and their sum is no evidence
+  /// of a second cause.
+  std::optional<std::string> only_bends(const Term& term, const NullFit& variances,
+                                        const CrossValidation& with_term) const;
   /// The newest effect with an amplitude of each group's own, where the data ask for it.
   void let_groups_differ();
   /// Of the runs' means within the fit, and its degrees of freedom.
@@ -60,6 +69,11 @@ class Search {
   double rms_of(const Eigen::MatrixXd& column) const;
 
   // structure without a name: search_curves.cpp
+  /// Whether neighbouring runs resemble each other beside the model and the best curve, whose own dependence
+  /// on what drifts must not count as theirs. Then the search has begun again, with runs so correlated.
+  bool begin_with_run_correlation();
+  /// All curves on top of the model: a scan without ways, and what was tried.
+  std::pair<Scan, std::vector<Curve>> scan_curves() const;
   void add_curves();
   bool add_best_curve();
   /// A name whose work a curve does as well was the wrong name for that curve.
@@ -74,13 +88,11 @@ class Search {
   void drop(std::size_t t, const JointFit& without);
   /// The same, and gives the newest curve the straight part that no name takes any more.
   void give_way_to_curve(std::size_t t, const JointFit& without);
+  /// Whether an effect has no other condition than what the curve is over.
+  bool lives_on(const Term& term, const Curve& curve) const;
   /// Effects whose own covariate bends away from their formula give way to a curve.
   void doubt_formulas();
   bool session_scatter_is_large() const;
-  /// The fitted variances, and how far neighbouring runs resemble each other beside the model and this
-  /// curve, whose own dependence on what drifts must not count as theirs. A smooth curve over what drifts
-  /// follows runs that do, and has no held-out gate to stop it.
-  NullFit correlated_null(const Curve& beside) const;
 
   // what cannot be told apart: search_rivals.cpp
   void find_confounded();
@@ -90,6 +102,7 @@ class Search {
   /// baseline.
   std::vector<Ranked> rivals_in_groups(const Accepted& accepted) const;
 
+  const Observations& given_;
   Observations observations_;  // a group's own amplitudes become a part of its baseline
   const std::vector<int>& rows_;
   const SearchSettings& settings_;

@@ -29,25 +29,49 @@ void Search::add_curves() {
   doubt_formulas();
 }
 
-bool Search::add_best_curve() {
-  settings_.progress("looking for structure without a name");
+std::pair<Search::Scan, std::vector<Curve>> Search::scan_curves() const {
   Scan scan;
   std::vector<Curve> tried;
-  for (std::size_t c = 0; c < curves_.size(); ++c) {
-    if (is_described(curves_[c])) continue;
+  for (const Curve& each : curves_) {
+    if (is_described(each)) continue;
     const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
-      return is_over(curves_[c], a.term.effect->covariates);
+      return is_over(each, a.term.effect->covariates);
     });
-    Curve curve = named ? without_trend(curves_[c], rows_) : curves_[c];
+    Curve curve = named ? without_trend(each, rows_) : each;
     Candidate candidate = as_candidate(curve);
     if (!can_be_seen(candidate)) continue;
     scan.candidates.push_back(std::move(candidate));
     tried.push_back(std::move(curve));
   }
+  if (!tried.empty()) rank(fit_, scan);
+  return {std::move(scan), std::move(tried)};
+}
+
+bool Search::begin_with_run_correlation() {
+  const auto [scan, tried] = scan_curves();
+  std::vector<Components> columns = fit_.linear.columns;
+  if (!tried.empty()) {
+    const auto& best = tried[scan.order[0]].columns;
+    columns.insert(columns.end(), best.begin(), best.end());
+  }
+  Components residual = difference(y_, fit_.linear.offset);
+  const AmplitudeFit fit = fit_amplitudes(observations_, residual, columns, fit_.variances, rows_);
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    for (std::size_t j = 0; j < residual.size(); ++j)
+      residual[j] -= fit.amplitude(static_cast<Eigen::Index>(c)) * columns[c][j];
+  std::mt19937_64 random(settings_.seed * 1000003 + 3000);
+  observations_.run_correlation = run_correlation(*mixed_, fit_.variances, residual, random);
+  if (observations_.run_correlation == std::array<double, 2>{0, 0}) return false;
+  begin();
+  return true;
+}
+
+bool Search::add_best_curve() {
+  settings_.progress("looking for structure without a name");
+  const auto [scan, tried] = scan_curves();
   if (tried.empty()) return false;
-  rank(fit_, scan);
   const std::size_t best = scan.order[0];
-  NullMaxima maxima(*scan.scan, correlated_null(tried[best]), settings_, 1000 + ++salt_);
+  NullMaxima maxima(*scan.scan, fit_.variances, settings_, 1000 + ++salt_);
   const double p = maxima.p(scan.fits[best].evidence);
   Round round;
   round.observed = scan.fits[best].evidence;
@@ -78,6 +102,7 @@ void Search::add_curve(const Curve& curve, double p) {
 /// test is one bend for one effect, and needs no maximum over everything.
 void Search::doubt_formulas() {
   for (std::size_t t = result_.accepted.size(); t-- > 0;) {
+    if (t >= result_.accepted.size()) continue;  // gone with another
     const Term term = result_.accepted[t].term;
     if (term.per_group || term.effect->parameters.size() > 1 ||
         static_cast<int>(result_.curves.size()) >= settings_.most_curves)
@@ -92,7 +117,7 @@ void Search::doubt_formulas() {
       if (!can_be_seen(scan.candidates[0])) continue;
       rank(fit_, scan);
       const double p =
-          NullMaxima(*scan.scan, correlated_null(bend), settings_, 2000 + ++salt_).p(scan.fits[0].evidence);
+          NullMaxima(*scan.scan, fit_.variances, settings_, 2000 + ++salt_).p(scan.fits[0].evidence);
       if (p > kDoubtedP) continue;
       const JointFit before = fit_;
       add_curve(bend, p);
@@ -109,6 +134,7 @@ void Search::doubt_formulas() {
 
 void Search::drop_what_a_curve_replaces() {
   for (std::size_t t = result_.accepted.size(); t-- > 0;) {
+    if (t >= result_.accepted.size()) continue;        // gone with another
     if (result_.accepted[t].term.per_group) continue;  // stands in the baseline
     const bool outshone = outshone_by_curve(result_.accepted[t].term);
     const JointFit without = fit_without(t);
@@ -132,9 +158,24 @@ void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
   found.instead_of.push_back(result_.accepted[t].term.effect->name);
   drop(t, without);
   found.curve = with_trend(found.curve);
+  // Now the curve does all that the covariate does: beside it no name for the covariate alone means anything.
+  for (std::size_t other = result_.accepted.size(); other-- > 0;) {
+    if (!lives_on(result_.accepted[other].term, found.curve)) continue;
+    found.instead_of.push_back(result_.accepted[other].term.effect->name);
+    drop(other, fit_without(other));
+  }
   fit_.model.curves.back() = found.curve;
   fit_ = fit_jointly(observations_, fit_.model, rows_);
   read_back_terms();
+}
+
+bool Search::lives_on(const Term& term, const Curve& curve) const {
+  if (term.rotor != curve.rotor || term.per_group) return false;
+  const auto& names = term.effect->covariates;
+  return is_over(curve, names) && std::all_of(names.begin(), names.end(), [&](const std::string& name) {
+           return is_over(curve, {name}) || observations_.find(name) == nullptr ||
+                  observations_.not_usable.contains(name);
+         });
 }
 
 bool Search::outshone_by_curve(const Term& term) const {
@@ -150,20 +191,6 @@ bool Search::outshone_by_curve(const Term& term) const {
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
   const double most = term.effect->parameters.size() > 1 ? kMostLeft_bending : kMostLeft;
   return rms_of(drawn) > most * rms_of(respond(term, observations_, predicted).value[0]);
-}
-
-NullFit Search::correlated_null(const Curve& beside) const {
-  std::vector<Components> columns = fit_.linear.columns;
-  columns.insert(columns.end(), beside.columns.begin(), beside.columns.end());
-  Components residual = difference(y_, fit_.linear.offset);
-  const AmplitudeFit fit = fit_amplitudes(observations_, residual, columns, fit_.variances, rows_);
-  for (std::size_t c = 0; c < columns.size(); ++c)
-    for (std::size_t j = 0; j < residual.size(); ++j)
-      residual[j] -= fit.amplitude(static_cast<Eigen::Index>(c)) * columns[c][j];
-  std::mt19937_64 random(settings_.seed * 1000003 + 3000 + salt_);
-  NullFit null = fit_.variances;
-  null.run_correlation = run_correlation(*mixed_, null, residual, random);
-  return null;
 }
 
 bool Search::session_scatter_is_large() const {

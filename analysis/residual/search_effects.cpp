@@ -155,6 +155,10 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
       round.outcome += fmt::format("{} does not predict unseen blocks; ", term.label());
       continue;
     }
+    if (const auto shared = only_bends(term, fit.variances, after)) {
+      round.outcome += fmt::format("{} is no more than a bend over {}; ", term.label(), *shared);
+      continue;
+    }
     result_.accepted.push_back({.term = term,
                                 .p = maxima.p(scan.fits[i].evidence),
                                 .gain = before.rmse() - after.rmse(),
@@ -168,6 +172,26 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
     return true;
   }
   return false;
+}
+
+std::optional<std::string> Search::only_bends(const Term& term, const NullFit& variances,
+                                              const CrossValidation& with_term) const {
+  for (const Curve& curve : curves_) {
+    const auto shares = [&](const Accepted& other) {
+      return is_over(curve, other.term.effect->covariates) &&
+             (other.term.rotor < 0 || other.term.rotor == term.rotor);
+    };
+    if (curve.columns.size() != 1 || curve.x.size() == 0 || curve.rotor != term.rotor ||
+        !is_over(curve, term.effect->covariates) ||
+        std::none_of(result_.accepted.begin(), result_.accepted.end(), shares))
+      continue;
+    std::vector<Components> columns = fit_.linear.columns;
+    columns.push_back(without_trend(curve, rows_).columns[0]);
+    const CrossValidation with_bend =
+        cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
+    if (!compare(with_bend, with_term).told_apart()) return curve.covariate;
+  }
+  return {};
 }
 
 void Search::let_groups_differ() {
@@ -296,13 +320,14 @@ double Search::rms_of(const Eigen::MatrixXd& column) const {
   Stacked stacked(0, 0);
   double squares = 0;
   Index count = 0;
-  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
-    if (!mixed_->strata()[s].means()) continue;
+  const MixedModel baseline = MixedModel::baseline_alone(observations_, rows_);
+  for (std::size_t s = 0; s < baseline.strata().size(); ++s) {
+    if (!baseline.strata()[s].means()) continue;
     Components components(1 + observations_.shape.size(),
                           Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
     components[0] = column;
-    stacked = mixed_->stack(s, {&components});
-    mixed_->project(s, 0, stacked);
+    stacked = baseline.stack(s, {&components});
+    baseline.project(s, 0, stacked);
     squares += stacked.squaredNorm();
     count += stacked.size();
   }

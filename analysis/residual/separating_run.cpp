@@ -143,7 +143,7 @@ VectorXd distances(const Observations& observations, const Term& first, const Te
   MatrixXd difference = respond(first, at, forces).value[0] - respond(second, at, forces).value[0];
   const MatrixXd usual = difference(std::vector<Index>(ordinary.begin(), ordinary.end()), Eigen::all);
   difference -= usual;
-  const MixedModel mixed(observations, rows, {0});
+  const MixedModel mixed = MixedModel::baseline_alone(observations, rows);
   const MatrixXd by_mode = difference * mixed.mode_matrix();
   VectorXd squares = VectorXd::Zero(by_mode.rows());
   for (std::size_t k = 0; k < mixed.strata().size(); ++k) {

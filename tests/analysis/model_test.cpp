@@ -157,7 +157,7 @@ TEST(ModelVersion, IsReadAsItWasWritten) {
   model.curves = {
       {.covariate = "clip", .rotor = 1, .low = 0, .high = 0.8, .coefficients = {1}, .centre = {0}},
       {.covariate = "rpm",
-       .shape = CurveShape::kLogParabola,
+       .shape = CurveShape::kLevelling,
        .low = 1,
        .high = 2,
        .coefficients = {2},

@@ -165,6 +165,21 @@ TEST_F(UiucStatic, ACurveWithoutANameIsScoredBesideTheName) {
   }
 }
 
+/// Two formulas of speed in opposite directions are a curve, and extrapolate worse than one.
+TEST_F(UiucStatic, WhatTwoNamesOfOneCovariateDoTogetherHasNoName) {
+  SKIP_WITHOUT_SHARED_DATA();
+  for (const std::string propeller : {"magf 10.0x6.0 - 2", "ma 11.0x4.0 - 2", "grsn 10.0x7.0 - 2"}) {
+    const json e = of(propeller, "rank(N) > 0.7");
+    EXPECT_EQ(e["verdict"], "partly_explained") << propeller;
+    EXPECT_EQ(e["adopted"].size(), 1u) << propeller;
+    EXPECT_EQ(e["unknown"][0]["covariate"], "speed_rpm") << propeller;
+    test::run_program(folder.path(), "explain --db t.db --adopt-empirical --json e.json");
+    const json with_curve = json::parse(read_text(folder / "e.json"));
+    EXPECT_LT(with_curve["after"]["held_out_rmse"], 0.3 * e["after"]["held_out_rmse"].get<double>())
+        << propeller;
+  }
+}
+
 TEST_F(UiucStatic, NothingIsFoundWhereThereIsNoTrend) {
   SKIP_WITHOUT_SHARED_DATA();
   for (const std::string hold_out : {"", "every second"}) {

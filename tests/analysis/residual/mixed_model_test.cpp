@@ -14,14 +14,25 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+struct Case {
+  int channels;
+  std::array<double, 2> run_correlation;
+
+  friend std::ostream& operator<<(std::ostream& out, const Case& c) {
+    return out << c.channels << " channels, " << c.run_correlation[0] << " and " << c.run_correlation[1];
+  }
+};
+
 /// Unequal blocks and groups; some runs are left out, as by a seal.
-struct MixedModelTest : testing::TestWithParam<int> {
+struct MixedModelTest : testing::TestWithParam<Case> {
   std::mt19937_64 random{test::seed()};
   Observations observations = test::simulate(
-      {.runs_of_block = {3, 7, 1, 5, 2, 6, 4}, .groups = 4, .channels = GetParam(), .shapes = 1}, random);
+      {.runs_of_block = {3, 7, 1, 5, 2, 6, 4}, .groups = 4, .channels = GetParam().channels, .shapes = 1},
+      random);
   std::vector<int> rows, others;
 
   MixedModelTest() {
+    observations.run_correlation = GetParam().run_correlation;
     for (int row = 0; row < static_cast<int>(observations.rows()); ++row)
       (row > 4 && row % 5 == 0 ? others : rows).push_back(row);
   }
@@ -30,6 +41,12 @@ struct MixedModelTest : testing::TestWithParam<int> {
     std::normal_distribution<double> normal;
     return MatrixXd::NullaryExpr(n, columns, [&] { return normal(random); });
   }
+  /// V of a stratum over σ².
+  MatrixXd covariance(const MixedModel& model, std::size_t stratum, std::size_t ratio) const {
+    const MixedModel::Stratum& s = model.strata()[stratum];
+    const double correlation = s.means() ? GetParam().run_correlation[s.first_mode == 0 ? 0 : 1] : 0;
+    return test::dense_covariance(observations, rows, kRatios[ratio], correlation);
+  }
   static MatrixXd part(const MatrixXd& stacked, Index n, Index mode) {
     return stacked.middleRows(mode * n, n);
   }
@@ -37,31 +54,28 @@ struct MixedModelTest : testing::TestWithParam<int> {
 
 TEST_P(MixedModelTest, StrataAreCommonAndDifferenceModesOfEveryComponent) {
   const MixedModel model(observations, rows);
-  ASSERT_EQ(model.strata().size(), GetParam() == 1 ? 2u : 4u);
+  ASSERT_EQ(model.strata().size(), GetParam().channels == 1 ? 2u : 4u);
   Index modes = 0;
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
     modes += model.strata()[s].modes;
     const auto fixed = model.strata()[s].means() ? 4 : 0;
     EXPECT_EQ(model.dof(s), model.strata()[s].modes * (static_cast<Index>(rows.size()) - fixed));
   }
-  EXPECT_EQ(modes, 2 * GetParam());
+  EXPECT_EQ(modes, 2 * GetParam().channels);
   const MatrixXd& q = model.mode_matrix();
   EXPECT_LT((q.transpose() * q - MatrixXd::Identity(q.rows(), q.cols())).norm(), 1e-12);
-  EXPECT_LT((q.col(0).array() - 1 / std::sqrt(GetParam())).matrix().norm(), 1e-12);
+  EXPECT_LT((q.col(0).array() - 1 / std::sqrt(GetParam().channels)).matrix().norm(), 1e-12);
 }
 
-TEST_P(MixedModelTest, WhiteningIsTheInverseRootOfTheCovariance) {
+TEST_P(MixedModelTest, WhiteningIsARootOfTheInverseCovariance) {
   const MixedModel model(observations, rows);
   const auto n = static_cast<Index>(rows.size());
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
-    if (model.strata()[s].means()) continue;  // there the baseline is taken out as well
     for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
-      Stacked columns = MatrixXd::Identity(n, n).replicate(model.strata()[s].modes, 1);
-      model.project(s, ratio, columns);
-      const MatrixXd v = test::dense_covariance(observations, rows, kRatios[ratio]);
-      const MatrixXd root = Eigen::SelfAdjointEigenSolver<MatrixXd>(v).operatorInverseSqrt();
-      for (Index mode = 0; mode < model.strata()[s].modes; ++mode)
-        EXPECT_LT((part(columns, n, mode) - root).norm(), 1e-10) << "ratio " << kRatios[ratio];
+      MatrixXd root = MatrixXd::Identity(n, n);
+      whiten(model.blocks(), kRatios[ratio], model.run_correlation(s), root);
+      EXPECT_LT((root.transpose() * root - covariance(model, s, ratio).inverse()).norm(), 1e-10)
+          << "stratum " << s << ", ratio " << kRatios[ratio];
     }
   }
 }
@@ -71,11 +85,12 @@ TEST_P(MixedModelTest, WhitenedSimulationsHaveTheIdentityAsCovariance) {
   constexpr std::size_t kSets = 20000;
   const double sigma = 0.3;
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
-    if (model.strata()[s].means()) continue;
     for (const std::size_t ratio : {std::size_t{0}, std::size_t{5}}) {
       Stacked data = model.simulate(s, std::vector<double>(kSets, sigma),
-                                    std::vector<std::size_t>(kSets, ratio), 0, random);
-      model.project(s, ratio, data);
+                                    std::vector<std::size_t>(kSets, ratio), model.run_correlation(s), random);
+      const auto n = static_cast<Index>(rows.size());
+      Eigen::Map<MatrixXd> by_mode(data.data(), n, data.size() / n);
+      whiten(model.blocks(), kRatios[ratio], model.run_correlation(s), by_mode);
       const MatrixXd covariance = data * data.transpose() / (sigma * sigma * kSets);
       const MatrixXd excess = covariance - MatrixXd::Identity(data.rows(), data.rows());
       // standard errors 1/√N off the diagonal and √(2/N) on it
@@ -99,12 +114,15 @@ TEST_P(MixedModelTest, ProjectionTakesOutWhatTheBaselineCanAbsorb) {
       const MatrixXd y = draw(n, 3);
       Stacked projected = y.replicate(model.strata()[s].modes, 1);
       model.project(s, ratio, projected);
-      const MatrixXd v = test::dense_covariance(observations, rows, kRatios[ratio]);
-      const MatrixXd root = Eigen::SelfAdjointEigenSolver<MatrixXd>(v).operatorInverseSqrt();
-      const MatrixXd wx = root * x, wy = root * y;
-      const MatrixXd residual = wy - wx * (wx.transpose() * wx).ldlt().solve(wx.transpose() * wy);
-      for (Index mode = 0; mode < model.strata()[s].modes; ++mode)
-        EXPECT_LT((part(projected, n, mode) - residual).norm(), 1e-9);
+      const MatrixXd v = covariance(model, s, ratio);
+      // whichever root it is of which the columns are left, their products are yᵀ P y
+      const MatrixXd vx = v.ldlt().solve(x), vy = v.ldlt().solve(y);
+      const MatrixXd products =
+          y.transpose() * vy - vy.transpose() * x * (x.transpose() * vx).inverse() * x.transpose() * vy;
+      for (Index mode = 0; mode < model.strata()[s].modes; ++mode) {
+        const MatrixXd left = part(projected, n, mode);
+        EXPECT_LT((left.transpose() * left - products).norm(), 1e-9);
+      }
     }
   }
 }
@@ -114,7 +132,7 @@ TEST_P(MixedModelTest, LogDeterminantsAreDenseOnes) {
   const MatrixXd x = test::dense_baseline(observations, rows, rows);
   for (std::size_t s = 0; s < model.strata().size(); ++s)
     for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
-      const MatrixXd v = test::dense_covariance(observations, rows, kRatios[ratio]);
+      const MatrixXd v = covariance(model, s, ratio);
       double expected = std::log(v.determinant());
       if (model.strata()[s].means()) expected += std::log((x.transpose() * v.ldlt().solve(x)).determinant());
       EXPECT_NEAR(model.log_determinant(s, ratio), 0.5 * model.strata()[s].modes * expected, 1e-9);
@@ -139,7 +157,7 @@ TEST_P(MixedModelTest, BaselinePredictsAsDenseGeneralisedLeastSquares) {
         EXPECT_EQ(variance.norm(), 0);
         continue;
       }
-      const MatrixXd v = test::dense_covariance(observations, rows, kRatios[ratio]);
+      const MatrixXd v = covariance(model, s, ratio);
       const MatrixXd information = x.transpose() * v.ldlt().solve(x);
       for (Index mode = 0; mode < modes; ++mode) {
         const MatrixXd expected =
@@ -187,7 +205,9 @@ TEST(MixedModel, BlocksOfSingleRowsHaveOneRatio) {
   EXPECT_EQ(MixedModel(observations, test::all_rows(observations)).ratios(), 1u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Rotors, MixedModelTest, testing::Values(1, 4));
+INSTANTIATE_TEST_SUITE_P(Rotors, MixedModelTest,
+                         testing::Values(Case{1, {0, 0}}, Case{4, {0, 0}}, Case{1, {0.6, 0}},
+                                         Case{4, {0.3, 0.6}}, Case{4, {0.4, 0.4}}));
 
 /// Estimated through everything that the baseline takes from the data.
 TEST(RunCorrelation, IsFoundWhereItIsAndNowhereElse) {

@@ -32,13 +32,16 @@ Observations simulate(const Design& design, std::mt19937_64& random) {
     // one offset of the session for each rotor and component
     MatrixXd offset(1 + design.shapes, design.channels);
     for (double& value : offset.reshaped()) value = session * normal(random);
+    Eigen::RowVectorXd scatter = Eigen::RowVectorXd::Zero(design.channels);
     for (int run = 0; run < design.runs_of_block[block]; ++run, ++row) {
       o.name.push_back(fmt::format("R{:04}", row + 1));
       o.block.push_back(static_cast<int>(block));
       o.group.push_back(row < design.groups ? static_cast<int>(row) : group(random));
       o.previous.push_back(run == 0 ? -1 : static_cast<int>(row) - 1);
+      const double before = run == 0 ? 0 : design.run_correlation;
       for (Index c = 0; c < design.channels; ++c) {
-        y(row, c) = level + 0.01 * o.group.back() + offset(0, c) + design.sigma * normal(random);
+        scatter(c) = before * scatter(c) + std::sqrt(1 - before * before) * design.sigma * normal(random);
+        y(row, c) = level + 0.01 * o.group.back() + offset(0, c) + scatter(c);
         for (int j = 0; j < design.shapes; ++j)
           o.shape[static_cast<std::size_t>(j)](row, c) = offset(j + 1, c) + design.sigma * normal(random);
       }
@@ -94,13 +97,17 @@ std::vector<int> all_rows(const Observations& observations) {
   return rows;
 }
 
-MatrixXd dense_covariance(const Observations& observations, const std::vector<int>& rows, double ratio) {
+MatrixXd dense_covariance(const Observations& observations, const std::vector<int>& rows, double ratio,
+                          double run_correlation) {
   const auto n = static_cast<Index>(rows.size());
   const auto block = [&](Index r) {
     return observations.block[static_cast<std::size_t>(rows[static_cast<std::size_t>(r)])];
   };
-  return MatrixXd::NullaryExpr(
-      n, n, [&](Index a, Index b) { return (a == b ? 1.0 : 0.0) + (block(a) == block(b) ? ratio : 0.0); });
+  return MatrixXd::NullaryExpr(n, n, [&](Index a, Index b) {
+    if (block(a) != block(b)) return 0.0;
+    // without rows of others in between, since simulated blocks follow each other
+    return std::pow(run_correlation, static_cast<double>(std::abs(a - b))) + ratio;
+  });
 }
 
 MatrixXd dense_baseline(const Observations& observations, const std::vector<int>& rows,

@@ -15,8 +15,9 @@ struct Design {
   int groups = 3;
   int channels = 1;
   int shapes = 0;
-  double sigma = 0.002;      // of a run, in y
-  double session_ratio = 1;  // session variance over run variance
+  double sigma = 0.002;        // of a run, in y
+  double session_ratio = 1;    // session variance over run variance
+  double run_correlation = 0;  // with the run before in the session
   bool multiplicative = true;
 };
 
@@ -37,9 +38,9 @@ const Effect& effect_named(const std::string& name);
 std::vector<const Effect*> every_effect();
 std::vector<int> all_rows(const Observations& observations);
 
-/// I + a Σ 11ᵀ over the blocks of `rows`.
-Eigen::MatrixXd dense_covariance(const Observations& observations, const std::vector<int>& rows,
-                                 double ratio);
+/// Φ + a 11ᵀ in each block of `rows`, Φ_ij = φ^|i − j|.
+Eigen::MatrixXd dense_covariance(const Observations& observations, const std::vector<int>& rows, double ratio,
+                                 double run_correlation = 0);
 
 /// An indicator and the slopes of each group of `rows`, in the order of their numbers; for `wanted` rows.
 Eigen::MatrixXd dense_baseline(const Observations& observations, const std::vector<int>& rows,

@@ -17,11 +17,12 @@ struct Statistics : testing::Test {
   std::mt19937_64 random{test::seed()};
   void SetUp() override { std::cout << "seed " << test::seed() << "\n"; }
 
-  Observations campaign(double session_ratio, int channels, int shapes) {
+  Observations campaign(double session_ratio, int channels, int shapes, double run_correlation = 0) {
     Observations o = test::simulate({.runs_of_block = {7, 5, 8, 6, 6, 9, 5, 7, 6, 4, 8, 7},
                                      .channels = channels,
                                      .shapes = shapes,
-                                     .session_ratio = session_ratio},
+                                     .session_ratio = session_ratio,
+                                     .run_correlation = run_correlation},
                                     random);
     test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
     test::add_covariate(o, "time_since_motor_start_s", 5, 400, random);
@@ -100,6 +101,28 @@ TEST_F(Statistics, NullCampaignsOfFourRotorsAreRarelyNamed) {
   }
   std::cout << named << " of " << kCampaigns << " named\n";
   EXPECT_LE(named, 7) << "binomial (100, 0.02): beyond 7 in 0.1 % of cases";
+}
+
+/// What drifts within a session goes with scatter that drifts too.
+TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
+  SearchSettings settings;
+  settings.simulations = 199;
+  constexpr int kCampaigns = 60;
+  int said = 0, seen = 0;
+  for (int i = 0; i < kCampaigns; ++i) {
+    Observations o = campaign(0.4, 4, 0, 0.7);
+    Covariate slow{"slow_drift", MatrixXd(o.rows(), 1)};
+    for (Eigen::Index row = 0; row < o.rows(); ++row)
+      slow.value(row, 0) = std::sin(0.5 * static_cast<double>(row));
+    o.covariates.push_back(std::move(slow));
+    settings.seed = static_cast<std::uint64_t>(i + 1);
+    const Attribution found = attribute(o, test::all_rows(o), test::every_effect(), settings);
+    said += found.accepted.empty() && found.curves.empty() ? 0 : 1;
+    seen += found.observations.run_correlation[1] > 0.4 ? 1 : 0;
+  }
+  std::cout << said << " of " << kCampaigns << " with structure, " << seen << " with the correlation\n";
+  EXPECT_LE(said, 9) << "binomial (60, 0.06): beyond 9 in 0.3 % of cases";
+  EXPECT_GE(seen, kCampaigns - 3);
 }
 
 TEST_F(Statistics, FittedParametersScatterAsTheirErrorsSay) {
