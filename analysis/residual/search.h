@@ -88,8 +88,8 @@ class Search {
   void drop(std::size_t t, const JointFit& without);
   /// The same, and gives the newest curve the straight part that no name takes any more.
   void give_way_to_curve(std::size_t t, const JointFit& without);
-  /// Whether an effect has no other condition than what the curve is over.
-  bool lives_on(const Term& term, const Curve& curve) const;
+  /// Whether a curve does all that an effect's only condition does, so that a name beside it means nothing.
+  bool is_work_of_a_curve(const Term& term) const;
   /// Effects whose own covariate bends away from their formula give way to a curve.
   void doubt_formulas();
   bool session_scatter_is_large() const;

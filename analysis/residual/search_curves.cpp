@@ -158,9 +158,8 @@ void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
   found.instead_of.push_back(result_.accepted[t].term.effect->name);
   drop(t, without);
   found.curve = with_trend(found.curve);
-  // Now the curve does all that the covariate does: beside it no name for the covariate alone means anything.
   for (std::size_t other = result_.accepted.size(); other-- > 0;) {
-    if (!lives_on(result_.accepted[other].term, found.curve)) continue;
+    if (!is_work_of_a_curve(result_.accepted[other].term)) continue;
     found.instead_of.push_back(result_.accepted[other].term.effect->name);
     drop(other, fit_without(other));
   }
@@ -169,12 +168,16 @@ void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
   read_back_terms();
 }
 
-bool Search::lives_on(const Term& term, const Curve& curve) const {
-  if (term.rotor != curve.rotor || term.per_group) return false;
+bool Search::is_work_of_a_curve(const Term& term) const {
   const auto& names = term.effect->covariates;
-  return is_over(curve, names) && std::all_of(names.begin(), names.end(), [&](const std::string& name) {
-           return is_over(curve, {name}) || observations_.find(name) == nullptr ||
-                  observations_.not_usable.contains(name);
+  return !term.per_group &&
+         std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
+           const auto recorded_elsewhere = [&](const std::string& name) {
+             return !is_over(found.curve, {name}) && observations_.find(name) != nullptr &&
+                    !observations_.not_usable.contains(name);
+           };
+           return found.curve.tilt.empty() && found.curve.rotor == term.rotor &&
+                  is_over(found.curve, names) && std::none_of(names.begin(), names.end(), recorded_elsewhere);
          });
 }
 

@@ -50,7 +50,7 @@ Search::Scan Search::scan_effects(const JointFit& base) const {
   Scan scan;
   const Eigen::MatrixXd predicted = predict_response(observations_, base.model, rows_);
   for (const Term& way : ways_) {
-    if (already_in(way)) continue;
+    if (already_in(way) || is_work_of_a_curve(way)) continue;
     Candidate candidate = candidate_of(way, predicted);
     if (!can_be_seen(candidate)) continue;
     scan.ways.push_back(way);
