@@ -137,6 +137,8 @@ ModelCurve curve_of(const Reader& reader) {
                    .centre = reader.numbers("centre"),
                    .tilt = reader.has("tilt") ? reader.numbers("tilt") : std::vector<double>()};
   if (!(curve.high > curve.low)) reader.fail("has no range: high is not above low");
+  if (is_of_logarithm(curve.shape) && !(curve.low > 0))
+    reader.fail("has a shape over the logarithm, and a low that is not above 0");
   if (curve.coefficients.size() != curve.centre.size())
     reader.fail("has not as many coefficients as values of centre");
   if (!curve.tilt.empty() && curve.tilt.size() != curve.coefficients.size())

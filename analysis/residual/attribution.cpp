@@ -11,12 +11,10 @@ Search::Search(const Observations& observations, const std::vector<int>& rows,
     : given_(observations),
       observations_(observations),
       rows_(rows),
+      effects_(effects),
       settings_(settings),
-      ways_(all_ways(effects, observations, rows)),
       curves_(curves_to_try(observations, rows)),
-      y_(response_components(observations)) {
-  for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
-}
+      y_(response_components(observations)) {}
 
 Attribution Search::run() {
   begin();
@@ -35,6 +33,9 @@ void Search::begin() {
   observations_ = given_;
   observations_.run_correlation = correlation;
   mixed_ = std::make_unique<MixedModel>(observations_, rows_);
+  ways_ = all_ways(effects_, observations_, rows_);
+  points_.clear();
+  for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
   result_ = {};
   result_.baseline = fit_jointly(observations_, {}, rows_);
   fit_ = result_.baseline;

@@ -16,6 +16,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
 std::vector<Untestable> untestable_effects(const Observations& observations,
                                            const std::vector<const Effect*>& effects,
                                            const std::vector<int>& rows) {
@@ -101,6 +103,15 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
     if (std::none_of(once.begin(), once.end(), [&](const Untestable& u) { return u.effect == entry.effect; }))
       once.push_back(entry);
   explanation.untestable = std::move(once);
+}
+
+}  // namespace
+
+void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
+                       const std::vector<int>& rows, Explanation& explanation) {
+  explanation.untestable = untestable_effects(observations, effects, rows);
+  warn_of_constant(observations, explanation);
+  warn_of_collinear(observations, explanation);
 }
 
 void warn_of_run_correlation(const Observations& observations, Explanation& explanation) {

@@ -5,9 +5,13 @@
 
 namespace tunnelrig {
 
+bool is_of_logarithm(CurveShape shape) {
+  return shape == CurveShape::kLogParabola || shape == CurveShape::kLevelling;
+}
+
 double curve_straight(CurveShape shape, double x, double low, double high) {
-  const bool of_logarithm = shape == CurveShape::kLogParabola || shape == CurveShape::kLevelling;
-  return 2 * (of_logarithm ? std::log(x / low) / std::log(high / low) : (x - low) / (high - low)) - 1;
+  return 2 * (is_of_logarithm(shape) ? std::log(x / low) / std::log(high / low) : (x - low) / (high - low)) -
+         1;
 }
 
 double curve_column(CurveShape shape, int k, double x, double low, double high) {

@@ -13,6 +13,9 @@ enum class CurveShape {
   kLevelling,    // low/x, with s of ln x: the same, but less and less where x grows
 };
 
+/// Whether s is that of ln x: then x is above 0.
+bool is_of_logarithm(CurveShape shape);
+
 /// s: −1 at `low`, 1 at `high`, beyond them outside.
 double curve_straight(CurveShape shape, double x, double low, double high);
 

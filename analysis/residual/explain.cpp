@@ -120,10 +120,8 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   for (const auto& [covariate, why] : observations.not_usable)
     explanation.warnings.push_back(fmt::format("{} is {}", covariate, why));
   const std::vector<int> rows = all_rows(observations);
-  explanation.untestable = untestable_effects(observations, effects, rows);
-  warn_of_constant(observations, explanation);
-  warn_of_collinear(observations, explanation);
   if (observations.blocks() < kFewestBlocks) {
+    report_untestable(observations, effects, rows, explanation);
     explain_too_few(observations, settings, explanation);
     return explanation;
   }
@@ -136,6 +134,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   Observations alone =
       observations;  // without what groups have of their own: what the baseline is held against
   alone.run_correlation = wide.run_correlation;
+  report_untestable(alone, effects, rows, explanation);
   warn_of_run_correlation(wide, explanation);
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;

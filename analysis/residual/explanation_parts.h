@@ -9,15 +9,10 @@ std::vector<int> all_rows(const Observations& observations);
 
 // --- conditions.cpp
 
-std::vector<Untestable> untestable_effects(const Observations& observations,
-                                           const std::vector<const Effect*>& effects,
-                                           const std::vector<int>& rows);
-
-/// Conditions that never changed, and so keep an effect from being tested.
-void warn_of_constant(const Observations& observations, Explanation& explanation);
-
-/// Pairs of covariates that no campaign of this design can tell apart.
-void warn_of_collinear(const Observations& observations, Explanation& explanation);
+/// Effects that cannot be tried and why; conditions that never changed, and so keep an effect from being
+/// tested; pairs of covariates that no campaign of this design can tell apart.
+void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
+                       const std::vector<int>& rows, Explanation& explanation);
 
 /// Neighbouring runs that resemble each other, as the search found and allowed for.
 void warn_of_run_correlation(const Observations& observations, Explanation& explanation);

@@ -105,6 +105,7 @@ class Search {
   const Observations& given_;
   Observations observations_;  // a group's own amplitudes become a part of its baseline
   const std::vector<int>& rows_;
+  const std::vector<const Effect*>& effects_;
   const SearchSettings& settings_;
   std::unique_ptr<MixedModel> mixed_;
   std::vector<Term> ways_;

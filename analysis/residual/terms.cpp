@@ -13,6 +13,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 /// Times within a run at which an effect that changes with time is evaluated.
 constexpr int kTimes = 32;
@@ -131,6 +132,31 @@ std::vector<double> change_points(const Observations& observations, const std::v
   return {first.begin() + kLeastBlocksBesideAStep, first.end() - kLeastBlocksBesideAStep + 1};
 }
 
+/// Whether the forces that the baseline predicts differ by clearly more than its constants scatter. What
+/// depends on the force of the run before would otherwise depend on that run's scatter, of which its group's
+/// constant has a part; all the more where a run's scatter goes with that of the run before.
+bool forces_differ(const Observations& observations) {
+  const bool correlated = observations.run_correlation != std::array<double, 2>{0, 0};
+  const double least = correlated ? 40 : 3;  // variance over that of the constants' errors
+  double variance = 0, noise = 0;
+  const double n = static_cast<double>(observations.rows()), groups = observations.groups();
+  if (n <= groups) return true;
+  for (Index c = 0; c < observations.channels(); ++c) {
+    VectorXd sum = VectorXd::Zero(observations.groups()), count = sum;
+    for (Index row = 0; row < observations.rows(); ++row) {
+      sum(observations.group[static_cast<std::size_t>(row)]) += observations.y(row, c);
+      count(observations.group[static_cast<std::size_t>(row)]) += 1;
+    }
+    const VectorXd constant = (sum.array() / count.array().max(1))(observations.group);
+    const VectorXd force = observations.multiplicative
+                               ? VectorXd(constant.array() + observations.known.col(c).array().log())
+                               : constant;
+    variance += (force.array() - force.mean()).square().mean();
+    noise += (observations.y.col(c) - constant).squaredNorm() / (n - groups) * groups / n;
+  }
+  return variance > least * noise;
+}
+
 }  // namespace
 
 std::string Term::label() const {
@@ -193,7 +219,10 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason = "the measured speed is part of the response";
   if (observations.coefficient && (effect.name == "nonlinearity" || effect.name == "bidirectional"))
     result.reason = "a coefficient is no force that a cell has read";
-  if (effect.needs_previous && observations.blocks_are_rows) result.reason = "the rows have no order";
+  if (effect.needs_previous && observations.blocks_are_rows)
+    result.reason = "the rows have no order";
+  else if (effect.needs_previous && !forces_differ(observations))
+    result.reason = "the forces differ by no more than they scatter, so no run has another force before it";
   return result;
 }
 

@@ -197,6 +197,19 @@ TEST(ModelVersion, BrokenDocumentsAreRefusedByName) {
   EXPECT_THAT(message_of([] { model_from_json("[]", "x"); }), HasSubstr("x is no object"));
 }
 
+TEST(ModelVersion, ALogarithmOfWhatIsNotAboveZeroIsRefused) {
+  ModelVersion model = model_of({});
+  model.curves = {{.covariate = "rpm",
+                   .shape = CurveShape::kLevelling,
+                   .low = -1,
+                   .high = 2,
+                   .coefficients = {2},
+                   .centre = {0.3}}};
+  model.covariance = Eigen::MatrixXd::Identity(1, 1);
+  EXPECT_THAT(message_of([&] { model_from_json(model_json(model), "m"); }),
+              HasSubstr("has a shape over the logarithm, and a low that is not above 0"));
+}
+
 TEST(ModelVersion, AnyDamageIsAnswered) {
   const std::string good = model_json(model_of({term("creep", {0.01, 100}, {90})}));
   int refused = 0;

@@ -207,5 +207,18 @@ TEST(Terms, SayWhatIsMissing) {
   EXPECT_THAT(testability(test::effect_named("wake_recirculation"), o).reason, testing::HasSubstr("tunnel"));
 }
 
+TEST(Terms, TheRunBeforeIsNoRegressorWhereAllForcesAreOne) {
+  std::mt19937_64 random(test::seed() + 8);
+  for (const bool different : {false, true}) {
+    Observations o = test::simulate({.groups = 12, .channels = 4}, random);
+    add_every_covariate(o, random);
+    if (!different)
+      for (Eigen::Index row = 0; row < o.rows(); ++row)
+        o.y.row(row).array() -= 0.01 * o.group[static_cast<std::size_t>(row)];
+    for (const char* effect : {"hysteresis", "creep_recovery"})
+      EXPECT_EQ(testability(test::effect_named(effect), o).ok(), different) << effect;
+  }
+}
+
 }  // namespace
 }  // namespace tunnelrig
