@@ -123,8 +123,8 @@ TEST(Score, OutsideTheLibrary) {
   const json truth = key("outside", {"humidity_wave"});
   const std::vector<Outcome> outcomes = {outcome(truth, right), outcome(truth, wrong),
                                          outcome(truth, explanation({adopted("creep")}))};
-  EXPECT_EQ(metric(outcomes, "outside the library: a wrong name").successes, 1);
-  EXPECT_EQ(metric(outcomes, "outside: unknown, right covariate").successes, 1);
+  EXPECT_EQ(metric(outcomes, "outside, 1 sigma: a wrong name").successes, 1);
+  EXPECT_EQ(metric(outcomes, "outside, 1 sigma: unknown, right covariate").successes, 1);
 }
 
 TEST(Score, ConfoundedPairs) {

@@ -43,6 +43,8 @@ def cells_around_it():
     for noise in NOISES:
         for size in (0.25, 2, 4):
             yield cell("one", noise, size)
+        for blocks in (16, 18, 20, 22, 24):
+            yield cell("outside", noise, 2, blocks)
         for track, blocks in itertools.product(("none", "one", "two"), (8, 12)):
             yield cell(track, noise, 1, blocks)
         for track in TRACKS:

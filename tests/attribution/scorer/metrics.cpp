@@ -185,8 +185,12 @@ Value ratio_on(const std::string& track, const std::function<double(const Explan
 
 void add_names(Table& table) {
   table.share("no effect: a name given", 0, 0.05, on("none", {}, gave_a_name));
-  table.share("outside the library: a wrong name", 0, 0.05, on("outside", {}, gave_a_name));
-  table.share("outside: unknown, right covariate", 0.90, 1, on("outside", {}, unknown_with_right_covariate));
+  for (const double size : {1.0, 2.0}) {
+    table.share(fmt::format("outside, {:g} sigma: a wrong name", size), 0, 0.05,
+                on("outside", size, gave_a_name));
+    table.share(fmt::format("outside, {:g} sigma: unknown, right covariate", size), 0.90, 1,
+                on("outside", size, unknown_with_right_covariate));
+  }
   table.share("one effect, 1 sigma: truth in the set", 0.98, 1, on("one", 1.0, truths_in_sets));
   table.share("one effect, 0.5 sigma: truth in the set", 0.90, 1, on("one", 0.5, truths_in_sets));
   table.share("one effect, 1 sigma: named, nothing else", 0.93, 1,
