@@ -172,12 +172,13 @@ bool Search::is_work_of_a_curve(const Term& term) const {
   const auto& names = term.effect->covariates;
   return !term.per_group &&
          std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
-           const auto recorded_elsewhere = [&](const std::string& name) {
-             return !is_over(found.curve, {name}) && observations_.find(name) != nullptr &&
-                    !observations_.not_usable.contains(name);
+           const auto varies_beside_it = [&](const std::string& name) {
+             const Covariate* other = is_over(found.curve, {name}) ? nullptr : observations_.find(name);
+             return other != nullptr && !observations_.not_usable.contains(name) &&
+                    other->value.maxCoeff() > other->value.minCoeff();
            };
            return found.curve.tilt.empty() && found.curve.rotor == term.rotor &&
-                  is_over(found.curve, names) && std::none_of(names.begin(), names.end(), recorded_elsewhere);
+                  is_over(found.curve, names) && std::none_of(names.begin(), names.end(), varies_beside_it);
          });
 }
 
