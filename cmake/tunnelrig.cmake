@@ -20,10 +20,9 @@ if(TUNNELRIG_FUZZ)
   add_compile_options(-fsanitize=fuzzer-no-link)
 endif()
 
-# For folders that wait, parse options or are run once: what is compiled takes a third of the time. Trees with sanitizers
-# (RelWithDebInfo) optimise the libraries; what is only here would be compiled for longer than it runs.
+# For folders that wait, parse options or are run once: what is compiled takes a third of the time.
 macro(tunnelrig_optimise_less)
-  add_compile_options($<$<CONFIG:Release>:-O1> $<$<CONFIG:RelWithDebInfo>:-O0>)
+  add_compile_options($<$<CONFIG:Release>:-O1>)
 endmacro()
 
 # For folders whose loops pass over every sample, or run in the control loop: wider vectors, deeper inlining.

@@ -222,7 +222,7 @@ Testability testability(const Effect& effect, const Observations& observations) 
   if (effect.needs_previous && observations.blocks_are_rows)
     result.reason = "the rows have no order";
   else if (effect.needs_previous && !forces_differ(observations))
-    result.reason = "the forces differ by no more than they scatter, so no run has another force before it";
+    result.reason = "the forces differ too little beside their scatter for the run before to tell";
   return result;
 }
 

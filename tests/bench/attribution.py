@@ -214,7 +214,7 @@ def parse_arguments():
     parser = argparse.ArgumentParser(prog="rig bench attribution", description=__doc__,
                                      epilog="Example: ./rig bench attribution --campaigns 10 --track one --noise white")
     parser.add_argument("build", type=pathlib.Path, help=argparse.SUPPRESS)
-    parser.add_argument("--campaigns", type=int, help="per cell (200, overnight; smoke: 2)")
+    parser.add_argument("--campaigns", type=int, help="per cell (200, overnight; smoke: 1)")
     parser.add_argument("--first", type=int, default=0, help="number of the first one: others than those that a rule was made on")
     parser.add_argument("--track", action="append", choices=TRACKS)
     parser.add_argument("--noise", action="append", choices=NOISES)
@@ -242,7 +242,7 @@ def main():
     if not re.search(r"^\s+explain\s", verbs, re.MULTILINE):
         print("this program has no verb explain; there is nothing to score", file=sys.stderr)
         return SKIPPED
-    campaigns = options.campaigns or (2 if options.smoke else 200)
+    campaigns = options.campaigns or (1 if options.smoke else 200)
     wanted = [(one, index) for one in chosen_cells(options) for index in range(options.first, options.first + campaigns)]
     if not wanted:
         print("no cell is left of this choice", file=sys.stderr)
@@ -260,7 +260,7 @@ def main():
         chosen.flush()
         scorer = build / "tests" / "attribution" / "score_attribution"
         code = subprocess.run([scorer, chosen.name, *options.score], check=False).returncode
-        if options.smoke:  # two campaigns a cell say nothing of a target, but all of a crash or a broken contract
+        if options.smoke:  # one campaign a cell says nothing of a target, but all of a crash or a broken contract
             code = broken(json.loads(subprocess.run([scorer, chosen.name, "--json"], check=False,
                                                     capture_output=True, text=True).stdout))
     print_cost(results, names)

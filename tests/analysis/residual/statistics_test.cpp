@@ -107,7 +107,7 @@ TEST_F(Statistics, NullCampaignsOfFourRotorsAreRarelyNamed) {
 TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
   SearchSettings settings;
   settings.simulations = 199;
-  constexpr int kCampaigns = 60;
+  constexpr int kCampaigns = 40;
   int said = 0, seen = 0;
   for (int i = 0; i < kCampaigns; ++i) {
     Observations o = campaign(0.4, 4, 0, 0.7);
@@ -121,7 +121,7 @@ TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
     seen += found.observations.run_correlation[1] > 0.4 ? 1 : 0;
   }
   std::cout << said << " of " << kCampaigns << " with structure, " << seen << " with the correlation\n";
-  EXPECT_LE(said, 9) << "binomial (60, 0.06): beyond 9 in 0.3 % of cases";
+  EXPECT_LE(said, 7) << "binomial (40, 0.06): beyond 7 in 0.2 % of cases";
   EXPECT_GE(seen, kCampaigns - 3);
 }
 
