@@ -176,8 +176,7 @@ std::string ModelTerm::label() const {
 }
 
 double ModelCurve::column(std::size_t k, double x) const {
-  return curve_column(shape, static_cast<int>(k) + 1, x, low, high) -
-         (tilt.empty() ? 0 : tilt[k] * curve_straight(shape, x, low, high)) - centre[k];
+  return tilted_column(shape, tilt, k, x, low, high) - centre[k];
 }
 
 std::string ModelCurve::label() const {

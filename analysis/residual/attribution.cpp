@@ -19,8 +19,12 @@ Search::Search(const Observations& observations, const std::vector<int>& rows,
 Attribution Search::run() {
   begin();
   add_effects();
-  if (begin_with_run_correlation()) add_effects();
-  add_curves();
+  CurveScan curves = scan_curves();
+  if (begin_with_run_correlation(curves)) {
+    add_effects();
+    curves = scan_curves();
+  }
+  add_curves(curves);
   find_confounded();
   result_.session_unknown = session_scatter_is_large();
   result_.final = fit_;
@@ -32,7 +36,7 @@ void Search::begin() {
   const auto correlation = observations_.run_correlation;
   observations_ = given_;
   observations_.run_correlation = correlation;
-  mixed_ = std::make_unique<MixedModel>(observations_, rows_);
+  make_models();
   ways_ = all_ways(effects_, observations_, rows_);
   points_.clear();
   for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
@@ -41,6 +45,11 @@ void Search::begin() {
   fit_ = result_.baseline;
   result_.detectable_sigma = detectable_by_one(*mixed_, fit_.variances, settings_.alpha);
   critical_ = 0;
+}
+
+void Search::make_models() {
+  mixed_ = std::make_unique<MixedModel>(observations_, rows_);
+  baseline_ = std::make_unique<MixedModel>(MixedModel::baseline_alone(observations_, rows_));
 }
 
 std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,

@@ -21,6 +21,12 @@ double curve_column(CurveShape shape, int k, double x, double low, double high) 
   return shape == CurveShape::kLevelling ? low / x : straight * straight;
 }
 
+double tilted_column(CurveShape shape, const std::vector<double>& tilt, std::size_t i, double x, double low,
+                     double high) {
+  return curve_column(shape, static_cast<int>(i) + 1, x, low, high) -
+         (tilt.empty() ? 0 : tilt[i] * curve_straight(shape, x, low, high));
+}
+
 std::string_view name_of(CurveShape shape) {
   switch (shape) {
     case CurveShape::kWaves:

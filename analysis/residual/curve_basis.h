@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string_view>
+#include <vector>
 
 namespace tunnelrig {
 
@@ -21,6 +22,10 @@ double curve_straight(CurveShape shape, double x, double low, double high);
 
 /// The k-th column (from 1) at x.
 double curve_column(CurveShape shape, int k, double x, double low, double high);
+
+/// The same of the i-th coefficient (from 0), less what was taken out of it of s; `tilt` empty: nothing was.
+double tilted_column(CurveShape shape, const std::vector<double>& tilt, std::size_t i, double x, double low,
+                     double high);
 
 /// "waves", "parabola", "log_parabola", "levelling".
 std::string_view name_of(CurveShape shape);

@@ -145,6 +145,11 @@ Curve with_trend(const Curve& curve) {
   return result;
 }
 
+bool is_bend_over(const Curve& curve, const std::vector<std::string>& covariates, int rotor) {
+  return curve.columns.size() == 1 && curve.x.size() > 0 && curve.rotor == rotor &&
+         is_over(curve, covariates);
+}
+
 Candidate as_candidate(const Curve& curve) {
   // Rotors alone are as likely together as all of them alike, as with named effects.
   const auto channels = static_cast<double>(curve.columns[0][0].cols());

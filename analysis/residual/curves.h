@@ -36,6 +36,9 @@ Curve with_trend(const Curve& curve);
 /// Whether one of these covariates is what the curve is over.
 bool is_over(const Curve& curve, const std::vector<std::string>& covariates);
 
+/// Whether the curve is a single bend over a covariate of these, of this rotor (−1: all).
+bool is_bend_over(const Curve& curve, const std::vector<std::string>& covariates, int rotor);
+
 Candidate as_candidate(const Curve& curve);
 
 }  // namespace tunnelrig

@@ -36,10 +36,8 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
     VectorXd basis(k);
     const double x = low + u * (high - low);
     for (Index b = 0; b < k; ++b)
-      basis(b) = curve_column(found.curve.shape, static_cast<int>(b) + 1, x, low, high) -
-                 (found.curve.tilt.empty() ? 0
-                                           : found.curve.tilt[static_cast<std::size_t>(b)] *
-                                                 curve_straight(found.curve.shape, x, low, high));
+      basis(b) =
+          tilted_column(found.curve.shape, found.curve.tilt, static_cast<std::size_t>(b), x, low, high);
     const double value = scale * basis.dot(amplitude),
                  half = 1.96 * scale * std::sqrt(std::max(0.0, basis.dot(covariance * basis)));
     result.shape.push_back({x, value, value - half, value + half});

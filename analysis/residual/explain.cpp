@@ -131,8 +131,8 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
     explanation.warnings.push_back(group + " has runs in sealed blocks only: it is not scored");
   const Attribution found = attribute(observations, seal.open, effects, settings);
   const Observations& wide = found.observations;
-  Observations alone =
-      observations;  // without what groups have of their own: what the baseline is held against
+  // What the baseline is held against: the same, without what groups have of their own.
+  Observations alone = observations;
   alone.run_correlation = wide.run_correlation;
   report_untestable(alone, effects, rows, explanation);
   warn_of_run_correlation(wide, explanation);

@@ -22,13 +22,18 @@ MatrixXd orthonormal_modes(Index channels) {
   return Eigen::HouseholderQR<MatrixXd>(modes).householderQ();
 }
 
+/// Φ^(−½) makes a block's 1 to (1, w, w, …).
+double weight_of_later(double run_correlation) {
+  return run_correlation == 0 ? 1 : std::sqrt((1 - run_correlation) / (1 + run_correlation));
+}
+
 }  // namespace
 
 void whiten(const std::vector<std::vector<Index>>& blocks, double session_ratio, double run_correlation,
             Eigen::Ref<MatrixXd> columns) {
-  // Φ^(−½) takes from each run what the one before it foretells, and makes a block's 1 to (1, w, w, …).
+  // Φ^(−½) takes from each run what the one before it foretells.
   const double scale = 1 / std::sqrt(1 - run_correlation * run_correlation);
-  const double w = run_correlation == 0 ? 1 : (1 - run_correlation) * scale;
+  const double w = weight_of_later(run_correlation);
   Eigen::RowVectorXd mean(columns.cols());
   for (const auto& runs : blocks) {
     if (run_correlation != 0)
@@ -71,23 +76,27 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
   }
   if (observations.blocks_are_rows) ratios_ = 1;
   for (auto& [block, runs] : blocks) blocks_.push_back(std::move(runs));
-  const bool alike =
-      strata_.size() == 1 + observations.shape.size() || run_correlation_[0] == run_correlation_[1];
+  const bool alike = observations.channels() == 1 || run_correlation_[0] == run_correlation_[1];
+  const auto wanted = [&](std::size_t r) {
+    return ratio.empty() || std::find(ratio.begin(), ratio.end(), r) != ratio.end();
+  };
   for (std::size_t s = 0; s < (alike ? 1U : 2U); ++s) {
     prepared_[s].resize(ratios_);
     for (std::size_t r = 0; r < ratios_; ++r)
-      if (ratio.empty() || std::find(ratio.begin(), ratio.end(), r) != ratio.end())
-        prepared_[s][r] = prepare(r, run_correlation_[s]);
+      if (wanted(r)) prepared_[s][r] = prepare(r, run_correlation_[s]);
   }
+  log_determinant_.assign(strata_.size(), std::vector<double>(ratios_));
+  for (std::size_t s = 0; s < strata_.size(); ++s)
+    for (std::size_t r = 0; r < ratios_; ++r)
+      if (wanted(r)) log_determinant_[s][r] = make_log_determinant(s, r);
 }
 
 double MixedModel::run_correlation(std::size_t stratum) const {
-  return strata_[stratum].means() ? run_correlation_[strata_[stratum].first_mode == 0 ? 0 : 1] : 0;
+  return strata_[stratum].means() ? run_correlation_[strata_[stratum].side()] : 0;
 }
 
 const MixedModel::Prepared& MixedModel::prepared(std::size_t stratum, std::size_t ratio) const {
-  const std::size_t own = strata_[stratum].first_mode == 0 || prepared_[1].empty() ? 0 : 1;
-  return prepared_[own][ratio];
+  return prepared_[prepared_[1].empty() ? 0 : strata_[stratum].side()][ratio];
 }
 
 MatrixXd MixedModel::baseline_of(const std::vector<int>& rows, const std::vector<int>& groups) const {
@@ -162,13 +171,13 @@ Index MixedModel::dof(std::size_t stratum) const {
   return runs * strata_[stratum].modes;
 }
 
-double MixedModel::log_determinant(std::size_t stratum, std::size_t ratio) const {
+double MixedModel::make_log_determinant(std::size_t stratum, std::size_t ratio) const {
   const double correlation = run_correlation(stratum), less = 1 - correlation * correlation;
-  const double w2 = (1 - correlation) * (1 - correlation) / less;
+  const double w = weight_of_later(correlation);
   double log_v = 0;
   for (const auto& runs : blocks_) {
     const auto after_first = static_cast<double>(runs.size() - 1);
-    log_v += after_first * std::log(less) + std::log1p(kRatios[ratio] * (1 + w2 * after_first));
+    log_v += after_first * std::log(less) + std::log1p(kRatios[ratio] * (1 + w * w * after_first));
   }
   return 0.5 * strata_[stratum].modes *
          (log_v + (strata_[stratum].means() ? prepared(stratum, ratio).log_xvx : 0));

@@ -38,6 +38,7 @@ class MixedModel {
     std::size_t component = 0;  // 0: the runs' means; j: their course's j-th cosine
     int first_mode = 0, modes = 1;
     bool means() const { return component == 0; }
+    std::size_t side() const { return first_mode == 0 ? 0 : 1; }  // common, differences
   };
 
   /// `ratio`: only these ratios are prepared (of each stratum); empty: all.
@@ -51,8 +52,10 @@ class MixedModel {
   const std::vector<std::vector<Eigen::Index>>& blocks() const { return blocks_; }  // positions in rows()
   const std::vector<Stratum>& strata() const { return strata_; }
   Eigen::Index dof(std::size_t stratum) const;  // runs · modes less the baseline's
-  double log_determinant(std::size_t stratum,
-                         std::size_t ratio) const;    // restricted likelihood's constant, ½ log(…)
+  /// Restricted likelihood's constant, ½ log(…).
+  double log_determinant(std::size_t stratum, std::size_t ratio) const {
+    return log_determinant_[stratum][ratio];
+  }
   std::size_t ratios() const { return ratios_; }      // 1 where blocks are single rows
   double run_correlation(std::size_t stratum) const;  // 0 for courses
 
@@ -99,6 +102,7 @@ class MixedModel {
              const std::array<double, 2>& run_correlation);
   /// Of a stratum of runs' means: their baseline.
   const Prepared& prepared(std::size_t stratum, std::size_t ratio) const;
+  double make_log_determinant(std::size_t stratum, std::size_t ratio) const;
   Prepared prepare(std::size_t ratio, double run_correlation);
   Part decompose(std::size_t ratio, double run_correlation, std::vector<Eigen::Index> runs,
                  std::vector<int> groups) const;
@@ -118,6 +122,7 @@ class MixedModel {
   Eigen::Index baseline_columns_ = 0;
   /// By ratio; of the rotors' differences only where their runs are correlated otherwise than the means.
   std::array<std::vector<Prepared>, 2> prepared_;
+  std::vector<std::vector<double>> log_determinant_;  // stratum, ratio
 };
 
 }  // namespace tunnelrig

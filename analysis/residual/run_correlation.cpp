@@ -58,7 +58,7 @@ std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fi
     const Spread none = simulated(model, fit, s, 0, random);
     if (seen < none.mean + 2 * none.deviation) continue;
     const Spread known = simulated(model, fit, s, kKnown, random);
-    result[model.strata()[s].first_mode == 0 ? 0 : 1] =
+    result[model.strata()[s].side()] =
         std::clamp(kKnown * (seen - none.mean) / (known.mean - none.mean), 0.0, kMost);
   }
   return result;

@@ -30,8 +30,15 @@ class Search {
     std::vector<std::size_t> order;  // by evidence, best first
   };
 
+  struct CurveScan {
+    Scan scan;                 // without ways
+    std::vector<Curve> tried;  // its candidates
+  };
+
   /// The model without any effect; what was found before is forgotten.
   void begin();
+  /// Those of `observations_`.
+  void make_models();
 
   // named effects: search_effects.cpp
   void add_effects();
@@ -71,11 +78,12 @@ class Search {
   // structure without a name: search_curves.cpp
   /// Whether neighbouring runs resemble each other beside the model and the best curve, whose own dependence
   /// on what drifts must not count as theirs. Then the search has begun again, with runs so correlated.
-  bool begin_with_run_correlation();
-  /// All curves on top of the model: a scan without ways, and what was tried.
-  std::pair<Scan, std::vector<Curve>> scan_curves() const;
-  void add_curves();
-  bool add_best_curve();
+  bool begin_with_run_correlation(const CurveScan& curves);
+  /// All curves on top of the model.
+  CurveScan scan_curves() const;
+  /// `first`: the curves on top of the model as it is.
+  void add_curves(const CurveScan& first);
+  bool add_best_curve(const CurveScan& curves);
   /// A name whose work a curve does as well was the wrong name for that curve.
   void drop_what_a_curve_replaces();
   /// Whether the newest curve, over a covariate of this effect, has more of the effect's size than its
@@ -107,7 +115,7 @@ class Search {
   const std::vector<int>& rows_;
   const std::vector<const Effect*>& effects_;
   const SearchSettings& settings_;
-  std::unique_ptr<MixedModel> mixed_;
+  std::unique_ptr<MixedModel> mixed_, baseline_;  // baseline_: of runs that are independent
   std::vector<Term> ways_;
   std::vector<Curve> curves_;
   Components y_;

@@ -21,17 +21,18 @@ constexpr double kDoubtedP = 0.01;  // of a bend beside an effect, tested alone
 
 }  // namespace
 
-void Search::add_curves() {
-  while (static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve()) {
+void Search::add_curves(const CurveScan& first) {
+  bool added = settings_.most_curves > 0 && add_best_curve(first);
+  while (added) {
     drop_what_a_curve_replaces();
     add_effects();
+    added = static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve(scan_curves());
   }
   doubt_formulas();
 }
 
-std::pair<Search::Scan, std::vector<Curve>> Search::scan_curves() const {
-  Scan scan;
-  std::vector<Curve> tried;
+Search::CurveScan Search::scan_curves() const {
+  CurveScan result;
   for (const Curve& each : curves_) {
     if (is_described(each)) continue;
     const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
@@ -40,18 +41,17 @@ std::pair<Search::Scan, std::vector<Curve>> Search::scan_curves() const {
     Curve curve = named ? without_trend(each, rows_) : each;
     Candidate candidate = as_candidate(curve);
     if (!can_be_seen(candidate)) continue;
-    scan.candidates.push_back(std::move(candidate));
-    tried.push_back(std::move(curve));
+    result.scan.candidates.push_back(std::move(candidate));
+    result.tried.push_back(std::move(curve));
   }
-  if (!tried.empty()) rank(fit_, scan);
-  return {std::move(scan), std::move(tried)};
+  if (!result.tried.empty()) rank(fit_, result.scan);
+  return result;
 }
 
-bool Search::begin_with_run_correlation() {
-  const auto [scan, tried] = scan_curves();
+bool Search::begin_with_run_correlation(const CurveScan& curves) {
   std::vector<Components> columns = fit_.linear.columns;
-  if (!tried.empty()) {
-    const auto& best = tried[scan.order[0]].columns;
+  if (!curves.tried.empty()) {
+    const auto& best = curves.tried[curves.scan.order[0]].columns;
     columns.insert(columns.end(), best.begin(), best.end());
   }
   Components residual = difference(y_, fit_.linear.offset);
@@ -66,9 +66,9 @@ bool Search::begin_with_run_correlation() {
   return true;
 }
 
-bool Search::add_best_curve() {
+bool Search::add_best_curve(const CurveScan& curves) {
   settings_.progress("looking for structure without a name");
-  const auto [scan, tried] = scan_curves();
+  const auto& [scan, tried] = curves;
   if (tried.empty()) return false;
   const std::size_t best = scan.order[0];
   NullMaxima maxima(*scan.scan, fit_.variances, settings_, 1000 + ++salt_);
@@ -108,9 +108,7 @@ void Search::doubt_formulas() {
         static_cast<int>(result_.curves.size()) >= settings_.most_curves)
       continue;
     for (const Curve& curve : curves_) {
-      if (curve.columns.size() != 1 || curve.x.size() == 0 || curve.rotor != term.rotor ||
-          !is_over(curve, term.effect->covariates) || is_described(curve))
-        continue;
+      if (!is_bend_over(curve, term.effect->covariates, term.rotor) || is_described(curve)) continue;
       const Curve bend = without_trend(curve, rows_);
       Scan scan;
       scan.candidates.push_back(as_candidate(bend));

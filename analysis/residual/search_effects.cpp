@@ -181,8 +181,7 @@ std::optional<std::string> Search::only_bends(const Term& term, const NullFit& v
       return is_over(curve, other.term.effect->covariates) &&
              (other.term.rotor < 0 || other.term.rotor == term.rotor);
     };
-    if (curve.columns.size() != 1 || curve.x.size() == 0 || curve.rotor != term.rotor ||
-        !is_over(curve, term.effect->covariates) ||
+    if (!is_bend_over(curve, term.effect->covariates, term.rotor) ||
         std::none_of(result_.accepted.begin(), result_.accepted.end(), shares))
       continue;
     std::vector<Components> columns = fit_.linear.columns;
@@ -219,7 +218,7 @@ void Search::let_groups_differ() {
       cross_validate(wider, difference(y_, fit.linear.offset), fit.linear.columns, fit.variances, rows_));
   if (!(gain.mean > gain.standard_error)) return;
   observations_ = std::move(wider);
-  mixed_ = std::make_unique<MixedModel>(observations_, rows_);
+  make_models();
   fit_ = std::move(fit);
   read_back_terms();
 }
@@ -320,14 +319,13 @@ double Search::rms_of(const Eigen::MatrixXd& column) const {
   Stacked stacked(0, 0);
   double squares = 0;
   Index count = 0;
-  const MixedModel baseline = MixedModel::baseline_alone(observations_, rows_);
-  for (std::size_t s = 0; s < baseline.strata().size(); ++s) {
-    if (!baseline.strata()[s].means()) continue;
+  for (std::size_t s = 0; s < baseline_->strata().size(); ++s) {
+    if (!baseline_->strata()[s].means()) continue;
     Components components(1 + observations_.shape.size(),
                           Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
     components[0] = column;
-    stacked = baseline.stack(s, {&components});
-    baseline.project(s, 0, stacked);
+    stacked = baseline_->stack(s, {&components});
+    baseline_->project(s, 0, stacked);
     squares += stacked.squaredNorm();
     count += stacked.size();
   }

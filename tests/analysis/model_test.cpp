@@ -157,13 +157,19 @@ TEST(ModelVersion, IsReadAsItWasWritten) {
   model.curves = {
       {.covariate = "clip", .rotor = 1, .low = 0, .high = 0.8, .coefficients = {1}, .centre = {0}},
       {.covariate = "rpm",
-       .shape = CurveShape::kLevelling,
+       .shape = CurveShape::kLogParabola,
        .low = 1,
        .high = 2,
        .coefficients = {2},
        .centre = {0.3},
-       .tilt = {0.1}}};
-  model.covariance = 0.5 * Eigen::MatrixXd::Identity(6, 6);
+       .tilt = {0.1}},
+      {.covariate = "volts",
+       .shape = CurveShape::kLevelling,
+       .low = 1,
+       .high = 2,
+       .coefficients = {3},
+       .centre = {0.4}}};
+  model.covariance = 0.5 * Eigen::MatrixXd::Identity(7, 7);
   model.covariance(1, 0) = model.covariance(0, 1) = 1.0 / 3;
   const ModelVersion read = model_from_json(model_json(model), "m");
   EXPECT_EQ(model_json(read), model_json(model));

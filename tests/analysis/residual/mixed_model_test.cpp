@@ -44,7 +44,7 @@ struct MixedModelTest : testing::TestWithParam<Case> {
   /// V of a stratum over σ².
   MatrixXd covariance(const MixedModel& model, std::size_t stratum, std::size_t ratio) const {
     const MixedModel::Stratum& s = model.strata()[stratum];
-    const double correlation = s.means() ? GetParam().run_correlation[s.first_mode == 0 ? 0 : 1] : 0;
+    const double correlation = s.means() ? GetParam().run_correlation[s.side()] : 0;
     return test::dense_covariance(observations, rows, kRatios[ratio], correlation);
   }
   static MatrixXd part(const MatrixXd& stacked, Index n, Index mode) {
