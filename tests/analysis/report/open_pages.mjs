@@ -1,9 +1,10 @@
-// Opens report pages in headless Chromium, wide and narrow, light and dark, uses their controls, and says
-// what is wrong.
+// Opens report pages in headless Chromium, uses their controls, and says what is wrong. The first page is
+// opened wide and light, and narrow and dark; those behind it, which differ in their data, in turns.
 //
-//   node open_pages.mjs CHROMIUM PROFILE_FOLDER PAGE.html…        what is wrong, a line each; exit code 1 if
-//   anything is SCREENSHOTS=FOLDER node open_pages.mjs …                      also leaves a picture of each
-//   view there
+//   node open_pages.mjs CHROMIUM PROFILE_FOLDER PAGE.html…
+//
+// A line for each thing that is wrong; exit code 1 if anything is. SCREENSHOTS=FOLDER leaves a picture of each
+// view there.
 //
 // Speaks the DevTools protocol over a pipe: no port, no packages.
 import {spawn} from 'node:child_process';
@@ -136,8 +137,8 @@ const exercise = `
 
 const browser = start();
 let wrong = 0;
-for (const page of pages) {
-  for (const view of views) {
+for (const [k, page] of pages.entries()) {
+  for (const view of k === 0 ? views : [views[k % views.length]]) {
     const {plots, complaints} = await look(browser, page, view);
     console.log(`${basename(page)} at ${view.width} pixels, ${view.scheme}: ${plots} plots, ${
         complaints.length === 0 ? 'well' : 'not well'}`);

@@ -44,9 +44,11 @@ struct Pages {
   test::TemporaryFolder folder;
   std::string names;
 
-  void add(const std::string& name, const std::string& flights = "", const ModelChoice& model = {}) {
-    const CampaignFile file(folder / (name + ".db"), CampaignFile::Access::kRead);
-    const ReportData data = report_data(file, {.db = name + ".db",
+  void add(const std::string& name) { add(name, name, "", {}); }
+  void add(const std::string& name, const std::string& db, const std::string& flights,
+           const ModelChoice& model) {
+    const CampaignFile file(folder / (db + ".db"), CampaignFile::Access::kRead);
+    const ReportData data = report_data(file, {.db = db + ".db",
                                                .program_version = "0",
                                                .arguments = "tunnelrig report",
                                                .model = model,
@@ -74,8 +76,8 @@ TEST(ReportPage, OpensInABrowser) {
                       nlohmann::json{{"explanation", test::explanation("confounded")}}.dump());
   }
   write_text(pages.folder / "flights.json", kFlights);
-  // once more, with a model in force and flights
-  pages.add("whole", (pages.folder / "flights.json").string(), {{}, test::adopted_model()});
+  pages.add("with_model_and_flights", "whole", (pages.folder / "flights.json").string(),
+            {{}, test::adopted_model()});
   pages.campaign("one_rotor", {.raw_data = false, .rotors = 1});
   pages.campaign("one_run", {.raw_data = false, .open_space = false, .columns = 1, .rows = 1, .repeats = 1});
   test::make_table(pages.folder / "table.db");
