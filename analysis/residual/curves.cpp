@@ -59,6 +59,17 @@ int different_values(const Covariate& covariate, const std::vector<int>& rows) {
   return static_cast<int>(values.size());
 }
 
+/// The widest part of the covariate's range without a row in it, over that range.
+double widest_gap(const Covariate& covariate, const std::vector<int>& rows) {
+  std::set<double> values;
+  for (const int row : rows)
+    for (Index c = 0; c < covariate.value.cols(); ++c) values.insert(covariate.value(row, c));
+  double gap = 0;
+  for (auto next = std::next(values.begin()); next != values.end(); ++next)
+    gap = std::max(gap, *next - *std::prev(next));
+  return gap / (*values.rbegin() - *values.begin());
+}
+
 /// What is straight, on the curve's rotors.
 MatrixXd straight_over(const Curve& curve) {
   const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
@@ -101,8 +112,10 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
     };
     if (most >= 1)
       for (const CurveShape bend : bends_over(observations, covariate)) add(bend, 1);
+    // Where a whole wave finds no row its height is anything.
+    const double gap = most >= kBends[1] ? widest_gap(covariate, rows) : 0;
     for (const int count : kBends)
-      if (count <= most) add(CurveShape::kWaves, count);
+      if (count <= most && gap * count <= 2) add(CurveShape::kWaves, count);
   }
   if (!observations.shape.empty())
     for (const int rotor : rotors)

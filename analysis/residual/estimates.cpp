@@ -92,35 +92,35 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
       const bool theory = k == 0 && fit.model.terms[t].at_theory;
       const double value = theory ? fit.model.terms[t].parameters[k] : centre.terms[t].parameters[k];
       const double middle = centre.terms[t].parameters[k];
-      result[t].push_back({parameter.name, parameter.unit, value, middle - half, middle + half, theory});
+      result[t].push_back({parameter.name, parameter.unit, value, middle - half, middle + half, theory, {}});
     }
   }
   return result;
 }
 
-ParameterEstimate estimate_over_groups(const Observations& observations, const Term& term,
-                                       const std::vector<int>& rows) {
-  Term unit = term;
-  unit.per_group = false;
-  unit.parameters[0] = 0;
-  const MatrixXd x = respond(unit, observations, predict_response(observations, {}, rows)).derivative[0][0];
-  std::map<int, std::vector<int>> groups;
-  for (const int row : rows) groups[observations.group[static_cast<std::size_t>(row)]].push_back(row);
-  std::vector<double> amplitudes;
-  for (const auto& [group, own] : groups) {
-    const VectorXd u = x(own, 0).array() - x(own, 0).mean(),
-                   y = observations.y(own, 0).array() - observations.y(own, 0).mean();
-    if (u.squaredNorm() > 0) amplitudes.push_back(u.dot(y) / u.squaredNorm());
+ParameterEstimate summary_of_groups(const EffectParameter& parameter, std::vector<GroupEstimate> groups) {
+  constexpr std::size_t kFewestForOrder = 6;  // the median of fewer lies outside their range too often
+  ParameterEstimate result{.name = parameter.name, .unit = parameter.unit, .groups = groups};
+  if (groups.empty()) return result;
+  std::sort(groups.begin(), groups.end(),
+            [](const GroupEstimate& a, const GroupEstimate& b) { return a.value < b.value; });
+  const std::size_t n = groups.size();
+  result.value = (groups[(n - 1) / 2].value + groups[n / 2].value) / 2;
+  if (n < kFewestForOrder) {
+    result.low =
+        std::min_element(groups.begin(), groups.end(), [](auto& a, auto& b) { return a.low < b.low; })->low;
+    result.high = std::max_element(groups.begin(), groups.end(), [](auto& a, auto& b) {
+                    return a.high < b.high;
+                  })->high;
+    return result;
   }
-  const auto quantile = [&amplitudes](double p) {
-    std::sort(amplitudes.begin(), amplitudes.end());
-    return amplitudes[static_cast<std::size_t>(std::clamp(p, 0.0, 1.0) *
-                                               static_cast<double>(amplitudes.size() - 1))];
+  const auto quantile = [&](double p) {
+    return groups[static_cast<std::size_t>(std::clamp(p, 0.0, 1.0) * static_cast<double>(n - 1))].value;
   };
-  const double half =
-      1.96 / (2 * std::sqrt(static_cast<double>(amplitudes.size())));  // order statistics of a median
-  const EffectParameter& parameter = term.effect->parameters[0];
-  return {parameter.name, parameter.unit, quantile(0.5), quantile(0.5 - half), quantile(0.5 + half), false};
+  const double half = 1.96 / (2 * std::sqrt(static_cast<double>(n)));  // order statistics of a median
+  result.low = quantile(0.5 - half);
+  result.high = quantile(0.5 + half);
+  return result;
 }
 
 std::string unit_of(const Observations& observations, const EffectParameter& parameter) {

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace tunnelrig {
 namespace {
@@ -14,6 +15,7 @@ using Eigen::MatrixXd;
 
 constexpr int kFewestBlocks = 6;
 constexpr std::size_t kRowsPerGross = 10;  // at most one row of ten is set aside
+constexpr int kMostSearches = 2;           // after the first, each without the gross rows of the one before
 
 /// Errors of the fitted runs themselves, n × c in the unit.
 MatrixXd residuals(const Observations& observations, const JointFit& fit, const std::vector<int>& rows) {
@@ -93,7 +95,8 @@ void report_adopted(const Observations& observations, const Attribution& found, 
     const Accepted& accepted = found.accepted[t];
     AdoptedEffect adopted{whole.model.terms[t], parameters[t], accepted.p, accepted.gain, {}, {}};
     if (adopted.term.per_group)
-      adopted.parameters[0] = estimate_over_groups(observations, adopted.term, rows);
+      adopted.parameters[0] = summary_of_groups(adopted.term.effect->parameters[0],
+                                                estimate_by_group(observations, whole.model, t, rows));
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k)
       adopted.parameters[k].unit = unit_of(observations, adopted.term.effect->parameters[k]);
     for (const Ranked& rival : accepted.confounded)
@@ -103,6 +106,77 @@ void report_adopted(const Observations& observations, const Attribution& found, 
           separating_run(observations, accepted.term, accepted.confounded[0].term, found.final, rows);
     explanation.adopted.push_back(std::move(adopted));
   }
+}
+
+/// Where a step may lie as well, as far as the open runs tell.
+struct ChangePoint {
+  std::size_t term, parameter;
+  double low, high;  // 95 %
+};
+
+/// A step was sought among the open blocks: whether the sealed ones between them lie before or behind it, all
+/// runs tell.
+MeanModel with_change_points_of_all(const Observations& observations, MeanModel model,
+                                    const std::vector<int>& open, std::vector<ChangePoint>& result) {
+  constexpr double kHalfChiSquared = 1.92;  // 95 % of one degree of freedom, halved
+  const std::vector<int> rows = all_rows(observations);
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    const auto& parameters = model.terms[t].effect->parameters;
+    for (std::size_t k = 0; k < parameters.size(); ++k) {
+      if (parameters[k].role != ParameterRole::kChangePoint) continue;
+      const double found = model.terms[t].parameters[k];
+      const auto before = std::lower_bound(open.begin(), open.end(), static_cast<int>(found));
+      const int last = before == open.begin() ? -1 : *std::prev(before);
+      std::vector<std::pair<double, double>> likelihood;  // by first run
+      for (int row = last + 1; row <= static_cast<int>(found); ++row) {
+        const auto r = static_cast<std::size_t>(row);
+        if (row > 0 && observations.block[r] == observations.block[r - 1]) continue;
+        MeanModel moved = model;
+        moved.terms[t].parameters[k] = row;
+        likelihood.emplace_back(fit_jointly(observations, moved, rows).variances.log_likelihood, row);
+      }
+      if (likelihood.empty()) continue;
+      const auto [highest, best] = *std::max_element(likelihood.begin(), likelihood.end());
+      model.terms[t].parameters[k] = best;
+      ChangePoint point{t, k, best, best};
+      for (const auto& [value, row] : likelihood)
+        if (value > highest - kHalfChiSquared) {
+          point.low = std::min(point.low, row);
+          point.high = std::max(point.high, row);
+        }
+      result.push_back(point);
+    }
+  }
+  return model;
+}
+
+/// What the opened seal and the intervals say against what was adopted.
+void warn_of_doubts(Explanation& explanation) {
+  constexpr double kFarAboveFloor = 1.25;
+  for (const AdoptedEffect& adopted : explanation.adopted) {
+    const ParameterEstimate& amplitude = adopted.parameters[0];
+    if (amplitude.low <= 0 && amplitude.high >= 0)
+      explanation.warnings.push_back(fmt::format("{}: the 95 % interval of its {} holds 0: doubt it",
+                                                 adopted.term.label(), amplitude.name));
+  }
+  if (!explanation.adopted.empty() && explanation.after.held_out_rmse > explanation.before.held_out_rmse)
+    explanation.warnings.push_back(
+        "on the sealed blocks the error is larger with what was adopted than without: doubt it");
+  else if (explanation.after.held_out_low > kFarAboveFloor * explanation.noise_floor &&
+           explanation.noise_floor > 0)
+    explanation.warnings.push_back(
+        fmt::format("on the sealed blocks the error after is {:.2g} times the noise floor: something varies "
+                    "there that the "
+                    "model does not have",
+                    explanation.after.held_out_rmse / explanation.noise_floor));
+}
+
+std::string only_sealed_in_words(const std::vector<std::string>& groups) {
+  constexpr std::size_t kNamed = 5;
+  const std::vector<std::string> named(
+      groups.begin(), groups.begin() + static_cast<std::ptrdiff_t>(std::min(groups.size(), kNamed)));
+  return fmt::format("runs in sealed blocks only, so not scored: {}{}", fmt::join(named, ", "),
+                     groups.size() > kNamed ? fmt::format(" and {} more", groups.size() - kNamed) : "");
 }
 
 /// The protocol, once, on all rows.
@@ -127,8 +201,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   }
 
   const Seal seal = seal_blocks(observations, settings.seed);
-  for (const std::string& group : seal.only_sealed)
-    explanation.warnings.push_back(group + " has runs in sealed blocks only: it is not scored");
+  if (!seal.only_sealed.empty()) explanation.warnings.push_back(only_sealed_in_words(seal.only_sealed));
   const Attribution found = attribute(observations, seal.open, effects, settings);
   const Observations& wide = found.observations;
   // What the baseline is held against: the same, without what groups have of their own.
@@ -158,7 +231,9 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   explanation.after.rmse = rms(residuals(wide, named, seal.open));
 
   settings.progress("estimating parameters");
-  const JointFit whole = fit_jointly(wide, found.final.model, rows);
+  std::vector<ChangePoint> change_points;
+  const JointFit whole =
+      fit_jointly(wide, with_change_points_of_all(wide, found.final.model, seal.open, change_points), rows);
   const JointFit whole_baseline = fit_jointly(alone, {}, rows);
   for (const Accepted& accepted : found.accepted)
     if (at_bound(whole, accepted.term))
@@ -169,6 +244,12 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   const HeldOutErrors fitted = score(wide, whole, whole.variances, rows, rows);
   explanation.residual_after = fitted.error;
   report_adopted(wide, found, whole, rows, explanation);
+  for (const ChangePoint& point : change_points) {
+    ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
+    estimate.low = point.low;
+    estimate.high = point.high;
+  }
+  warn_of_doubts(explanation);
   for (const FoundCurve& curve : found.curves)
     explanation.unknown.push_back(describe(wide, whole, curve, rows));
   if (found.session_unknown && found.curves.empty())
@@ -176,6 +257,58 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   explanation.suspect_rows =
       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
   explanation.verdict = verdict_of(explanation);
+  return explanation;
+}
+
+std::vector<int> rows_but(const Observations& observations, const std::vector<SuspectRow>& left_out) {
+  std::vector<int> rows;
+  for (int r = 0; r < static_cast<int>(observations.rows()); ++r)
+    if (std::none_of(left_out.begin(), left_out.end(), [&](const SuspectRow& row) {
+          return row.row == observations.name[static_cast<std::size_t>(r)];
+        }))
+      rows.push_back(r);
+  return rows;
+}
+
+/// What is left of a table, and what is not.
+struct SetAside {
+  Observations kept;
+  std::size_t most;
+  std::vector<SuspectRow> rows;
+
+  explicit SetAside(const Observations& all) : kept(all), most(all.name.size() / kRowsPerGross) {}
+  std::size_t room() const { return most - std::min(most, rows.size()); }
+  void take(const std::vector<SuspectRow>& gross) {
+    kept = kept.subset(rows_but(kept, gross));
+    for (SuspectRow row : gross) {
+      row.set_aside = true;
+      rows.push_back(row);
+    }
+  }
+};
+
+/// A condition far from all others is said. Where the model found with such rows predicts worse than none, it
+/// is found without them.
+Explanation without_isolated(Explanation explanation, SetAside& aside,
+                             const std::vector<const Effect*>& effects, const SearchSettings& settings) {
+  const std::vector<IsolatedValue> isolated = isolated_values(aside.kept);
+  if (isolated.empty()) return explanation;
+  const bool misled = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
+  std::vector<SuspectRow> rows;
+  for (const IsolatedValue& value : isolated)
+    if (std::none_of(rows.begin(), rows.end(), [&](const SuspectRow& row) { return row.row == value.row; }))
+      rows.push_back({value.row, 0});
+  const bool aside_too = misled && rows.size() <= aside.room();
+  if (aside_too) {
+    aside.take(rows);
+    explanation = explain_all(aside.kept, effects, settings);
+  }
+  for (const IsolatedValue& value : isolated)
+    explanation.warnings.push_back(
+        fmt::format("{} of {} is {:.6g}, far from all others ({:.6g} to {:.6g}): {}", value.covariate,
+                    value.row, value.value, value.low, value.high,
+                    aside_too ? "set aside, since the model found with it predicted worse than none"
+                              : "a typing error?"));
   return explanation;
 }
 
@@ -193,6 +326,13 @@ std::vector<int> all_rows(const Observations& observations) {
   std::vector<int> rows(static_cast<std::size_t>(observations.rows()));
   std::iota(rows.begin(), rows.end(), 0);
   return rows;
+}
+
+Observations without_set_aside(const Observations& observations, const Explanation& explanation) {
+  std::vector<SuspectRow> aside;
+  for (const SuspectRow& row : explanation.suspect_rows)
+    if (row.set_aside) aside.push_back(row);
+  return aside.empty() ? observations : observations.subset(rows_but(observations, aside));
 }
 
 std::vector<Effect> effects_of_other_axes(const Observations& observations) {
@@ -215,19 +355,21 @@ std::vector<Effect> effects_of_other_axes(const Observations& observations) {
 Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
                     const SearchSettings& settings) {
   // A gross error hides what else is there: of a table's rows it is set aside, and said.
-  std::vector<SuspectRow> gross;
-  Observations kept = observations;
-  while (gross.size() < kept.name.size() / kRowsPerGross) {
-    const auto row = gross_row(kept);
-    if (!row) break;
-    gross.push_back(*row);
-    std::vector<int> rows;
-    for (int r = 0; r < static_cast<int>(kept.rows()); ++r)
-      if (kept.name[static_cast<std::size_t>(r)] != row->row) rows.push_back(r);
-    kept = kept.subset(rows);
+  SetAside aside(observations);
+  while (const auto row = gross_row(aside.kept)) {
+    if (aside.room() == 0) break;
+    aside.take({*row});
   }
-  Explanation explanation = explain_all(kept, effects, settings);
-  explanation.suspect_rows.insert(explanation.suspect_rows.begin(), gross.begin(), gross.end());
+  Explanation explanation = explain_all(aside.kept, effects, settings);
+  for (int again = 0; again < kMostSearches && observations.from_table; ++again) {
+    const std::vector<SuspectRow> gross = gross_rows(explanation.suspect_rows);
+    if (gross.empty() || gross.size() > aside.room()) break;  // many are no typing errors: the model is wrong
+    aside.take(gross);
+    explanation = explain_all(aside.kept, effects, settings);
+  }
+  if (observations.from_table)
+    explanation = without_isolated(std::move(explanation), aside, effects, settings);
+  explanation.suspect_rows.insert(explanation.suspect_rows.begin(), aside.rows.begin(), aside.rows.end());
   return explanation;
 }
 

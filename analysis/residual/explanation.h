@@ -2,6 +2,7 @@
 #pragma once
 
 #include "analysis/residual/attribution.h"
+#include "analysis/residual/group_amplitudes.h"
 #include "analysis/residual/seal.h"
 
 #include <map>
@@ -21,6 +22,7 @@ struct ParameterEstimate {
   std::string name, unit;
   double value = 0, low = 0, high = 0;  // 95 %
   bool theory = false;                  // the value is known physics; the interval is what the data say
+  std::vector<GroupEstimate> groups;    // where each group has its own; value is their median then
 };
 
 /// The run that would tell confounded effects apart.
@@ -61,6 +63,7 @@ struct Untestable {
 struct SuspectRow {
   std::string row;
   double studentised = 0;
+  bool set_aside = false;  // the model is found without it
 };
 
 struct Explanation {

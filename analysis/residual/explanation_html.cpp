@@ -38,12 +38,12 @@ class Page {
  public:
   Page(const Explanation& explanation, const Observations& observations)
       : explanation_(explanation),
-        observations_(observations),
-        rows_(static_cast<std::size_t>(observations.rows())),
+        observations_(without_set_aside(observations, explanation)),
+        rows_(static_cast<std::size_t>(observations_.rows())),
         before_(-explanation.residual_before),
         after_(-explanation.residual_after) {
     std::iota(rows_.begin(), rows_.end(), 0);
-    predicted_ = predict_response(observations, explanation.model, rows_);
+    predicted_ = predict_response(observations_, explanation.model, rows_);
   }
 
   Json runs() const {
@@ -243,7 +243,7 @@ class Page {
   }
 
   const Explanation& explanation_;
-  const Observations& observations_;
+  const Observations observations_;
   std::vector<int> rows_;
   MatrixXd before_, after_, predicted_;  // measured less predicted; forces
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -28,6 +29,10 @@ Json adopted_json(const AdoptedEffect& adopted) {
                                   {"ci95", {finite(parameter.low), finite(parameter.high)}},
                                   {"unit", parameter.unit},
                                   {"theory", parameter.theory}};
+    for (const GroupEstimate& group : parameter.groups)
+      parameters[parameter.name]["groups"].push_back({{"group", group.group},
+                                                      {"value", finite(group.value)},
+                                                      {"ci95", {finite(group.low), finite(group.high)}}});
   }
   Json separating = nullptr;
   if (const auto& run = adopted.separating_run) {
@@ -63,8 +68,31 @@ std::string parameters_in_words(const AdoptedEffect& adopted) {
     text += fmt::format("{}{} = {:.4g} {} [{:.4g}, {:.4g}]{}", text.empty() ? "" : ", ", parameter.name,
                         parameter.value, parameter.unit == "1" ? "" : parameter.unit, parameter.low,
                         parameter.high, parameter.theory ? " (theory)" : "");
+    if (parameter.groups.empty()) continue;
+    const auto [least, most] =
+        std::minmax_element(parameter.groups.begin(), parameter.groups.end(),
+                            [](const GroupEstimate& a, const GroupEstimate& b) { return a.value < b.value; });
+    text += fmt::format(", the median of {} groups from {:.4g} ({}) to {:.4g} ({})", parameter.groups.size(),
+                        least->value, least->group, most->value, most->group);
   }
   return text;
+}
+
+/// Lines that a terminal shows whole, indented.
+std::string wrapped(const std::string& text) {
+  constexpr std::size_t kWidth = 100;
+  std::string result, line = "  ";
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    if (line.size() + end - begin > kWidth) {
+      result += line + "\n";
+      line = "     ";
+    }
+    line += text.substr(begin, end - begin) + " ";
+    begin = end + 1;
+  }
+  line.pop_back();
+  return result + line + "\n";
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -112,7 +140,8 @@ std::string explanation_json(const Explanation& e) {
     json["untestable"].push_back(
         {{"effect", entry.effect}, {"missing", entry.missing}, {"reason", entry.reason}});
   for (const SuspectRow& row : e.suspect_rows)
-    json["suspect_rows"].push_back({{"row", row.row}, {"studentised", finite(row.studentised)}});
+    json["suspect_rows"].push_back(
+        {{"row", row.row}, {"studentised", finite(row.studentised)}, {"set_aside", row.set_aside}});
   return json.dump(1);
 }
 
@@ -147,12 +176,21 @@ std::string explanation_text(const Explanation& e) {
     text += fmt::format("no effect above {:.3g}{} (rms) at 80 % power\n", e.detectable, unit);
   if (!e.untestable.empty()) {
     text += "\nnot testable with these data:\n";
+    std::map<std::string, std::vector<std::string>> by_reason;
+    std::vector<std::string> not_recorded;
     for (const Untestable& u : e.untestable)
-      text +=
-          fmt::format("  {:<24}{}\n", u.effect, u.missing.empty() ? u.reason : "needs " + joined(u.missing));
+      if (u.missing.empty())
+        by_reason[u.reason].push_back(u.effect);
+      else
+        not_recorded.push_back(fmt::format("{} ({})", u.effect, joined(u.missing)));
+    for (const auto& [reason, effects] : by_reason)
+      text += wrapped(fmt::format("{}: {}", reason, joined(effects)));
+    if (!not_recorded.empty()) text += wrapped("its condition was not recorded: " + joined(not_recorded));
   }
   for (const SuspectRow& row : e.suspect_rows)
-    text += fmt::format("suspect: {} is {:.1f} standard deviations off\n", row.row, row.studentised);
+    text += row.studentised == 0 ? fmt::format("set aside: {}\n", row.row)
+                                 : fmt::format("suspect: {} is {:.1f} standard deviations off{}\n", row.row,
+                                               row.studentised, row.set_aside ? "; set aside" : "");
   return text;
 }
 

@@ -7,6 +7,9 @@ namespace tunnelrig {
 
 std::vector<int> all_rows(const Observations& observations);
 
+/// The rows that the explanation's residuals are of.
+Observations without_set_aside(const Observations& observations, const Explanation& explanation);
+
 // --- conditions.cpp
 
 /// Effects that cannot be tried and why; conditions that never changed, and so keep an effect from being
@@ -28,9 +31,8 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
                                                                 const JointFit& fit,
                                                                 const std::vector<int>& rows);
 
-/// Amplitudes of each group's own: their median over the groups, and its interval.
-ParameterEstimate estimate_over_groups(const Observations& observations, const Term& term,
-                                       const std::vector<int>& rows);
+/// The groups' median and its interval; of few groups what holds all of their intervals.
+ParameterEstimate summary_of_groups(const EffectParameter& parameter, std::vector<GroupEstimate> groups);
 
 // --- describe.cpp
 
@@ -55,5 +57,15 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
 /// The worst row of a table whose rows stand for themselves, if it is beyond doubt with all that the other
 /// axes can explain in the model.
 std::optional<SuspectRow> gross_row(const Observations& observations);
+
+/// Those that no scatter, however heavy its tails, is likely to have made.
+std::vector<SuspectRow> gross_rows(const std::vector<SuspectRow>& suspects);
+
+/// A condition that in one row lies as far from the others as a typing error puts it, or a run far away.
+struct IsolatedValue {
+  std::string row, covariate;
+  double value = 0, low = 0, high = 0;  // low, high: of all other rows
+};
+std::vector<IsolatedValue> isolated_values(const Observations& observations);
 
 }  // namespace tunnelrig

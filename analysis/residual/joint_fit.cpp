@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 
 #include <ceres/ceres.h>
@@ -167,6 +168,30 @@ Components difference(const Components& a, const Components& b) {
   return result;
 }
 
+namespace {
+
+/// The part of the baseline's lines beyond its constants: of each group, its own slopes fitted to `rows`.
+MatrixXd along_slopes(const Observations& observations, const MatrixXd& residual,
+                      const std::vector<int>& rows) {
+  MatrixXd result = MatrixXd::Zero(residual.rows(), residual.cols());
+  if (observations.slopes.cols() == 0) return result;
+  std::map<int, std::vector<int>> fitted, all;
+  for (const int row : rows) fitted[observations.group[static_cast<std::size_t>(row)]].push_back(row);
+  for (int row = 0; row < static_cast<int>(residual.rows()); ++row)
+    all[observations.group[static_cast<std::size_t>(row)]].push_back(row);
+  for (const auto& [group, own] : fitted) {
+    const MatrixXd x = observations.slopes(own, Eigen::all), y = residual(own, Eigen::all);
+    const Eigen::RowVectorXd middle = x.colwise().mean();
+    const MatrixXd slope = (x.rowwise() - middle)
+                               .completeOrthogonalDecomposition()
+                               .solve(MatrixXd(y.rowwise() - y.colwise().mean()));
+    for (const int row : all.at(group)) result.row(row) = (observations.slopes.row(row) - middle) * slope;
+  }
+  return result;
+}
+
+}  // namespace
+
 MatrixXd predict_response(const Observations& observations, const MeanModel& model,
                           const std::vector<int>& rows) {
   MatrixXd predicted = observations.value;  // only to begin with: replaced by the constants' prediction below
@@ -182,6 +207,7 @@ MatrixXd predict_response(const Observations& observations, const MeanModel& mod
       sum.row(observations.group[static_cast<std::size_t>(row)]) += residual.row(row);
       count(observations.group[static_cast<std::size_t>(row)]) += 1;
     }
+    added += along_slopes(observations, residual, rows);
     const Eigen::RowVectorXd overall = sum.colwise().sum() / count.sum();
     for (Index row = 0; row < residual.rows(); ++row) {
       const Index group = observations.group[static_cast<std::size_t>(row)];

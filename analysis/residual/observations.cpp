@@ -17,6 +17,7 @@ Observations Observations::subset(const std::vector<int>& kept) const {
   Observations part = *this;
   for (Eigen::MatrixXd* matrix : {&part.value, &part.known, &part.y, &part.slopes})
     *matrix = Eigen::MatrixXd((*matrix)(kept, Eigen::all));
+  if (sign.size() > 0) part.sign = Eigen::VectorXd(sign(kept));
   part.duration_s = Eigen::VectorXd(duration_s(kept));
   for (Covariate& covariate : part.covariates)
     covariate.value = Eigen::MatrixXd(covariate.value(kept, Eigen::all));
@@ -25,6 +26,11 @@ Observations Observations::subset(const std::vector<int>& kept) const {
   part.block = picked(block, kept);
   part.in_tunnel = picked(in_tunnel, kept);
   part.previous = picked(previous, kept);
+  std::vector<int> place(static_cast<std::size_t>(rows()), -1);
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    place[static_cast<std::size_t>(kept[k])] = static_cast<int>(k);
+  for (int& before : part.previous)
+    if (before >= 0) before = place[static_cast<std::size_t>(before)];
   part.held_out = picked(held_out, kept);
   return part;
 }

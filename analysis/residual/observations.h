@@ -7,6 +7,7 @@
 
 #include <array>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -49,7 +50,7 @@ struct Observations {
   std::vector<bool> in_tunnel;
   std::vector<int> previous;   // the run before in the same session, −1 for the first
   std::vector<bool> held_out;  // a table's hold_out expression; empty: seal blocks instead
-  bool blocks_are_rows = false;
+  bool from_table = false, blocks_are_rows = false;
   bool coefficient = false;  // the response is a thrust coefficient, or is made one by its measured speed
   bool groups_within_blocks =
       false;  // the block is the group: its baseline is estimated anew where it is held out
@@ -58,8 +59,11 @@ struct Observations {
   std::array<double, 2> run_correlation = {0, 0};
 
   Eigen::VectorXd newtons_per_volt;  // c
+  /// n: −1 where `value` is the magnitude of a response below zero, which effects are added to with its sign.
+  Eigen::VectorXd sign;
   Rig rig;
   std::vector<Covariate> covariates;
+  std::set<std::string> assumed;                  // covariates nobody recorded: the standard's
   std::map<std::string, std::string> not_usable;  // covariate: why (missing in some runs, constant, a text)
   std::vector<std::string> left_out;              // "run: reason"
 
@@ -75,7 +79,7 @@ struct Observations {
     return nullptr;
   }
 
-  /// The same of some rows only. Groups and blocks keep their numbers; for tables, whose rows have no order.
+  /// The same of some rows only, for tables. Groups and blocks keep their numbers.
   Observations subset(const std::vector<int>& kept) const;
 };
 

@@ -243,9 +243,26 @@ void set_response(const Source& source, const Response& response, Observations& 
       result.multiplicative ? MatrixXd((result.value.array() / result.known.array()).log()) : result.value;
 }
 
-}  // namespace
+/// A few runs below zero where all others pull are errors, and would make the whole model additive.
+void leave_out_against_sign(Source& source, const Response& response, Observations& result) {
+  constexpr std::size_t kOneOf = 20;
+  std::vector<std::size_t> kept;
+  std::vector<std::string> reasons;
+  for (Index row = 0; row < source.rows(); ++row) {
+    double lowest = std::numeric_limits<double>::infinity();
+    for (Index c = 0; c < response.channels; ++c) lowest = std::min(lowest, response.value(row, c));
+    if (lowest > 0)
+      kept.push_back(source.order[static_cast<std::size_t>(row)]);
+    else
+      reasons.push_back(fmt::format("{}: {} is {:.4g} {}, not above 0 as in all other runs",
+                                    source.run(row).run, result.response, lowest, response.unit));
+  }
+  if (reasons.size() * kOneOf > source.order.size()) return;
+  source.order = std::move(kept);
+  result.left_out.insert(result.left_out.end(), reasons.begin(), reasons.end());
+}
 
-Observations observe_runs(const CampaignData& data, const ObservationChoice& choice) {
+Observations observe(const CampaignData& data, const ObservationChoice& choice, bool all_runs) {
   const Reduction reduction = reduce_runs(data, {});
   Source source{data, reduction, std::vector<std::size_t>(reduction.runs.size())};
   std::iota(source.order.begin(), source.order.end(), 0U);
@@ -265,7 +282,9 @@ Observations observe_runs(const CampaignData& data, const ObservationChoice& cho
     for (int c = 0; c < data.info.rig.rotors; ++c)
       result.newtons_per_volt(c) = 1 / (data.certificate->cells[static_cast<std::size_t>(c)].gain_V_per_N *
                                         data.certificate->propellers.factor(c));
-  set_response(source, response_of(source, result.response, result.newtons_per_volt), result);
+  const Response response = response_of(source, result.response, result.newtons_per_volt);
+  if (!all_runs) leave_out_against_sign(source, response, result);
+  set_response(source, response, result);
   set_belonging(source, result);
   result.slopes.resize(source.rows(), 0);
   result.duration_s = Eigen::VectorXd::Zero(source.rows());
@@ -279,8 +298,14 @@ Observations observe_runs(const CampaignData& data, const ObservationChoice& cho
   return result;
 }
 
+}  // namespace
+
+Observations observe_runs(const CampaignData& data, const ObservationChoice& choice) {
+  return observe(data, choice, true);
+}
+
 Observations observe_campaign(const CampaignData& data, const ObservationChoice& choice) {
-  Observations result = observe_runs(data, choice);
+  Observations result = observe(data, choice, false);
   if (!(result.value.maxCoeff() > result.value.minCoeff()))
     throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain",
                                  result.response));

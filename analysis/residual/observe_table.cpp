@@ -73,6 +73,7 @@ void add_covariates(const Source& source, Observations& result) {
   if (schema.speed_column) add("speed_rpm", [&](Index r) { return source.row(r).speed_rpm.value_or(kNaN); });
   if (schema.diameter_column || schema.diameter_m)
     add("propeller_diameter_m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); });
+  if (result.find("air_temperature_C") == nullptr) result.assumed.insert("air_temperature_C");
   add("air_temperature_C", [&](Index r) { return source.row(r).air_temperature_C; });
 }
 
@@ -101,16 +102,22 @@ void set_response(const Source& source, const ObservationChoice& choice, Observa
   }
 }
 
+/// A cell's volts scatter alike under any load; what a rotor gives scatters with its size.
+bool scatters_alike(const TableColumn& response) {
+  return unit_from_name(response.unit).quantity == unit_from_name("V").quantity;
+}
+
 /// Groups that pulled the other way are measured by magnitude; a response of both signs is kept as it is.
-void set_scale(Observations& result, std::vector<std::size_t>& odd) {
+void set_scale(Observations& result, bool alike, std::vector<std::size_t>& odd) {
   std::map<int, double> sign;
   for (Index r = 0; r < result.value.rows(); ++r)
     sign[result.group[static_cast<std::size_t>(r)]] += result.value(r, 0) > 0 ? 1 : -1;
   for (Index r = 0; r < result.value.rows(); ++r)
     if (result.value(r, 0) * sign[result.group[static_cast<std::size_t>(r)]] <= 0)
       odd.push_back(static_cast<std::size_t>(r));
-  result.multiplicative = odd.empty();
+  result.multiplicative = odd.empty() && !alike;
   if (result.multiplicative) {
+    result.sign = result.value.array().sign();
     result.value = result.value.cwiseAbs();
     result.y = (result.value.array() / result.known.array()).log();
   } else {
@@ -242,6 +249,24 @@ void keep_as_covariate(const Source& source, const std::string& column, Observat
   if (result.find(column) == nullptr) result.covariates.push_back(std::move(covariate));
 }
 
+/// A table's rows have an order where a condition says so.
+void set_previous(Observations& result) {
+  const Covariate* order = result.find("run_order");
+  if (order == nullptr || result.not_usable.contains("run_order")) return;
+  std::vector<Index> rows(result.group.size());
+  std::iota(rows.begin(), rows.end(), Index{0});
+  std::stable_sort(rows.begin(), rows.end(),
+                   [&](Index a, Index b) { return order->value(a, 0) < order->value(b, 0); });
+  std::map<int, Index> last;  // of each block
+  for (const Index row : rows) {
+    const int block = result.blocks_are_rows ? 0 : result.block[static_cast<std::size_t>(row)];
+    const auto before = last.find(block);
+    if (before != last.end())
+      result.previous[static_cast<std::size_t>(row)] = static_cast<int>(before->second);
+    last[block] = row;
+  }
+}
+
 /// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
 void set_baseline(const Source& source, const ObservationChoice& choice, Observations& result) {
   result.baseline = choice.baseline.empty() ? "constant" : choice.baseline;
@@ -256,11 +281,13 @@ void set_baseline(const Source& source, const ObservationChoice& choice, Observa
   source.table.sheet.require(column);
   if (kind == "linear" && result.multiplicative) {  // a straight line is no power law: additive
     result.multiplicative = false;
-    result.y = result.value;
+    result.y = result.value = (result.value.array() * result.sign.replicate(1, result.value.cols()).array());
+    result.sign.resize(0);
     result.known.setOnes();
   }
   if (kind == "power" && !result.multiplicative)
-    throw InputError(fmt::format("--baseline {}: the response has both signs", choice.baseline));
+    throw InputError(fmt::format("--baseline {}: the response has both signs, or its scatter is not relative",
+                                 choice.baseline));
   result.slopes.resize(source.count(), 1);
   for (Index r = 0; r < source.count(); ++r) {
     const double x = source.cell(r, column);
@@ -285,14 +312,17 @@ Observations observe_table(const ObservationTable& table, const ObservationChoic
     throw InputError(fmt::format("the response {} is the same in every row: there is nothing to explain",
                                  result.response));
   std::vector<std::size_t> odd;
-  set_scale(result, odd);
+  const TableColumn& column = table.schema.response;
+  set_scale(result, result.response == column.column && scatters_alike(column), odd);
   add_covariates(source, result);
+  set_previous(result);
   set_baseline(source, choice, result);
   set_hold_out(source, result);
   set_groups_within_blocks(result);
   result.duration_s = VectorXd::Zero(source.count());
   result.newtons_per_volt = VectorXd::Ones(1);
   result.rig.rotors = 1;
+  result.from_table = true;
   if (const Covariate* diameter = result.find("propeller_diameter_m"))
     result.rig.propeller_radius_m = diameter->value.col(0).mean() / 2;
   if (const Covariate* speed = result.find("speed_rpm"))

@@ -59,7 +59,12 @@ class Search {
   std::optional<std::string> only_bends(const Term& term, const NullFit& variances,
                                         const CrossValidation& with_term) const;
   /// The newest effect with an amplitude of each group's own, where the data ask for it.
-  void let_groups_differ();
+  /// `before_others`: not where another name does as well for all groups alike.
+  void let_groups_differ(bool before_others);
+  bool groups_within_bounds(const Observations& wider, const MeanModel& model) const;
+  bool another_does_as_well(const CrossValidation& own, const NullFit& variances) const;
+  /// Whether a course that is straight or bends once over the order of runs does as well as the step.
+  bool is_gradual(const Term& step, const NullFit& variances, const CrossValidation& with_step) const;
   /// Of the runs' means within the fit, and its degrees of freedom.
   std::pair<double, double> sum_of_squares(const Observations& observations, const JointFit& fit) const;
   /// A joint fit with one term more; theory's coefficient where the data do not speak against it.
@@ -108,6 +113,7 @@ class Search {
   std::vector<Ranked> rivals(const Accepted& accepted, const JointFit& without, const Scan& scan) const;
   /// The same for an effect with an amplitude of each group's own: each rival takes its place in the
   /// baseline.
+  static bool within_bounds(const Scan& scan, std::size_t i);
   std::vector<Ranked> rivals_in_groups(const Accepted& accepted) const;
 
   const Observations& given_;

@@ -1,4 +1,5 @@
 // Named effects: ranked, tried, accepted one by one.
+#include "analysis/residual/group_amplitudes.h"
 #include "analysis/residual/null_maxima.h"
 #include "analysis/residual/search.h"
 #include "calibration/distributions.h"
@@ -33,8 +34,14 @@ double prior_weight(const Term& term, std::size_t ways) {
 }  // namespace
 
 void Search::add_effects() {
-  while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect())
-    swap_weaker();
+  bool wider = true;
+  while (wider) {
+    while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect())
+      swap_weaker();
+    const Index before = observations_.slopes.cols();
+    let_groups_differ(false);
+    wider = observations_.slopes.cols() > before;
+  }
 }
 
 bool Search::already_in(const Term& way) const {
@@ -159,6 +166,10 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
       round.outcome += fmt::format("{} is no more than a bend over {}; ", term.label(), *shared);
       continue;
     }
+    if (term.effect->has_change_point() && is_gradual(term, fit.variances, after)) {
+      round.outcome += fmt::format("{} is no better than a gradual change; ", term.label());
+      continue;
+    }
     result_.accepted.push_back({.term = term,
                                 .p = maxima.p(scan.fits[i].evidence),
                                 .gain = before.rmse() - after.rmse(),
@@ -167,7 +178,7 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
                                 .confounded = {}});
     fit_ = std::move(fit);
     read_back_terms();
-    if (observations_.channels() == 1 && observations_.groups() > 1) let_groups_differ();
+    let_groups_differ(true);
     round.outcome += "accepted " + result_.accepted.back().term.label();
     return true;
   }
@@ -193,7 +204,59 @@ std::optional<std::string> Search::only_bends(const Term& term, const NullFit& v
   return {};
 }
 
-void Search::let_groups_differ() {
+bool Search::is_gradual(const Term& step, const NullFit& variances, const CrossValidation& with_step) const {
+  Term always = step;
+  for (std::size_t k = 0; k < step.parameters.size(); ++k)
+    if (step.effect->parameters[k].role == ParameterRole::kChangePoint) always.parameters[k] = 0;
+  const Components after =
+      respond(always, observations_, predict_response(observations_, fit_.model, rows_)).derivative[0];
+  std::vector<Components> columns = fit_.linear.columns;
+  const double half = static_cast<double>(observations_.rows() - 1) / 2;
+  for (const int power : {1, 2}) {
+    columns.push_back(after);
+    for (Eigen::MatrixXd& component : columns.back())
+      for (Index row = 0; row < component.rows(); ++row)
+        component.row(row) *= std::pow(static_cast<double>(row) / half - 1, power);
+    const CrossValidation with_trend =
+        cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
+    if (compare(with_trend, with_step).mean <= 0) return true;
+  }
+  return false;
+}
+
+bool Search::another_does_as_well(const CrossValidation& own, const NullFit& variances) const {
+  constexpr std::size_t kTried = 3;
+  if (static_cast<int>(result_.accepted.size()) >= settings_.most_effects) return false;
+  const Scan scan = scan_effects(fit_);
+  std::vector<std::string> tried;
+  for (const std::size_t i : scan.order) {
+    const std::string& name = scan.ways[i].effect->name;
+    if (scan.fits[i].evidence < critical_ || tried.size() == kTried) break;
+    if (std::find(tried.begin(), tried.end(), name) != tried.end()) continue;
+    tried.push_back(name);
+    const JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
+    if (!fit.at_bound.empty()) continue;
+    const CrossValidation with_both = cross_validate(observations_, difference(y_, fit.linear.offset),
+                                                     fit.linear.columns, variances, rows_);
+    if (!compare(with_both, own).told_apart()) return true;
+  }
+  return false;
+}
+
+bool Search::groups_within_bounds(const Observations& wider, const MeanModel& model) const {
+  constexpr std::size_t kOneOf = 20;  // 95 % intervals
+  const EffectParameter& amplitude = model.terms.back().effect->parameters[0];
+  const auto groups = estimate_by_group(wider, model, model.terms.size() - 1, rows_);
+  const auto outside = std::count_if(groups.begin(), groups.end(), [&](const GroupEstimate& group) {
+    return group.low > amplitude.upper || group.high < amplitude.lower;
+  });
+  return static_cast<std::size_t>(outside) * kOneOf <= groups.size();
+}
+
+void Search::let_groups_differ(bool before_others) {
+  if (observations_.channels() > 1 || observations_.groups() < 2 || result_.accepted.empty() ||
+      result_.accepted.back().term.per_group)
+    return;
   const Term shared = result_.accepted.back().term;
   Term own = shared;
   own.per_group = true;
@@ -212,11 +275,14 @@ void Search::let_groups_differ() {
   const double f = (before.first - after.first) / more / (after.first / after.second);
   if (!(f > 0) || f_upper_p(f, more, after.second) > settings_.alpha) return;
   if (!fit.at_bound.empty()) return;
-  const LossDifference gain = compare(
-      cross_validate(observations_, difference(y_, fit_.linear.offset), fit_.linear.columns, fit.variances,
-                     rows_),
-      cross_validate(wider, difference(y_, fit.linear.offset), fit.linear.columns, fit.variances, rows_));
+  const CrossValidation with_own =
+      cross_validate(wider, difference(y_, fit.linear.offset), fit.linear.columns, fit.variances, rows_);
+  const LossDifference gain = compare(cross_validate(observations_, difference(y_, fit_.linear.offset),
+                                                     fit_.linear.columns, fit.variances, rows_),
+                                      with_own);
   if (!(gain.mean > gain.standard_error)) return;
+  if (!groups_within_bounds(wider, fit.model)) return;
+  if (before_others && another_does_as_well(with_own, fit.variances)) return;
   observations_ = std::move(wider);
   make_models();
   fit_ = std::move(fit);

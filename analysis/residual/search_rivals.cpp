@@ -56,13 +56,18 @@ std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& wit
     if (name == accepted.term.effect->name) continue;
     const bool listed = std::any_of(result.begin(), result.end(),
                                     [&](const Ranked& r) { return r.term.effect->name == name; });
-    if (listed) continue;
+    if (listed || (!scan.ways[i].effect->theory_only && !within_bounds(scan, i))) continue;
     if (compare(validate(scan.ways[i], scan.candidates[i]), *own).told_apart()) continue;
     Term term = scan.ways[i];
     term.parameters[0] = term.effect->theory_only ? *term.effect->theory() : scan.fits[i].amplitude(0);
     result.push_back({term, scan.fits[i].evidence, 0, term.parameters[0], 0});
   }
   return result;
+}
+
+bool Search::within_bounds(const Scan& scan, std::size_t i) {
+  const EffectParameter& amplitude = scan.ways[i].effect->parameters[0];
+  return scan.fits[i].amplitude(0) >= amplitude.lower && scan.fits[i].amplitude(0) <= amplitude.upper;
 }
 
 std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {

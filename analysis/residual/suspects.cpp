@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace tunnelrig {
 
@@ -22,27 +23,40 @@ double degrees_of_freedom(const Observations& observations, const JointFit& fit,
 
 std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
                                      const NullFit& variances, double dof) {
-  std::vector<SuspectRow> result;
-  const double limit = student_t_quantile(
-      1 - 0.005 / static_cast<double>(std::max<Index>(1, errors.error.size())), std::max(dof - 1, 1.0));
+  constexpr double kLeastLeft = 0.02;
   double sigma2 = 0;
   const double channels = static_cast<double>(observations.channels());
   for (std::size_t s = 0; s < (channels > 1 ? 2U : 1U); ++s)
     sigma2 += std::pow(variances.sigma[s], 2) * (1 + kRatios[variances.ratio[s]]) *
               (s == 0 ? 1 : channels - 1) / channels;
-  for (std::size_t r = 0; r < errors.rows.size(); ++r) {
+  // On the scale of the model, where residuals are normal: of a tenth and of ten times alike.
+  MatrixXd residual = -errors.error, left = MatrixXd::Ones(residual.rows(), residual.cols());  // 1 − h
+  for (Index r = 0; r < residual.rows(); ++r)
+    for (Index c = 0; c < residual.cols(); ++c) {
+      double unit = 1;
+      if (observations.multiplicative) {
+        const double value = observations.value(errors.rows[static_cast<std::size_t>(r)], c);
+        unit = std::abs(value + errors.error(r, c));  // what was predicted
+        residual(r, c) = std::log(std::abs(value) / unit);
+      }
+      left(r, c) = std::max(2 - std::pow(errors.expected_std(r, c) / unit, 2) / sigma2, kLeastLeft);
+    }
+  const auto missing = residual.array().isNaN();
+  const double variance = missing.select(0, residual).squaredNorm() / missing.select(0, left).sum();
+  const double limit = student_t_quantile(
+      1 - 0.005 / static_cast<double>(std::max<Index>(1, residual.size())), std::max(dof - 1, 1.0));
+  std::vector<SuspectRow> result;
+  for (Index r = 0; r < residual.rows(); ++r) {
     double worst = 0;
-    for (Index c = 0; c < errors.error.cols(); ++c) {
-      const double unit = observations.multiplicative ? std::abs(observations.value(errors.rows[r], c)) : 1;
-      const double leverage = std::pow(errors.expected_std(static_cast<Index>(r), c) / unit, 2) / sigma2 - 1;
-      const double inner =
-          -errors.error(static_cast<Index>(r), c) / unit / std::sqrt(sigma2 * std::max(1 - leverage, 1e-3));
-      const double room = std::max(dof - inner * inner, 1e-3);
-      const double outer = inner * std::sqrt(std::max(dof - 1, 1.0) / room);
+    for (Index c = 0; c < residual.cols(); ++c) {
+      if (std::isnan(residual(r, c)) || !(variance > 0)) continue;
+      const double inner = residual(r, c) / std::sqrt(variance * left(r, c));
+      const double outer = inner * std::sqrt(std::max(dof - 1, 1.0) / std::max(dof - inner * inner, 1.0));
       if (std::abs(outer) > std::abs(worst)) worst = outer;
     }
     if (std::abs(worst) > limit)
-      result.push_back({observations.name[static_cast<std::size_t>(errors.rows[r])], worst});
+      result.push_back(
+          {observations.name[static_cast<std::size_t>(errors.rows[static_cast<std::size_t>(r)])], worst});
   }
   std::sort(result.begin(), result.end(), [](const SuspectRow& a, const SuspectRow& b) {
     return std::abs(a.studentised) > std::abs(b.studentised);
@@ -66,6 +80,38 @@ std::optional<SuspectRow> gross_row(const Observations& observations) {
   const std::vector<SuspectRow> suspects = suspect_rows(observations, errors, fit.variances, dof);
   if (suspects.empty() || std::abs(suspects[0].studentised) < kGross) return {};
   return suspects[0];
+}
+
+std::vector<SuspectRow> gross_rows(const std::vector<SuspectRow>& suspects) {
+  constexpr double kBeyondHeavyTails = 10;
+  std::vector<SuspectRow> result;
+  for (const SuspectRow& row : suspects)
+    if (std::abs(row.studentised) > kBeyondHeavyTails) result.push_back(row);
+  return result;
+}
+
+std::vector<IsolatedValue> isolated_values(const Observations& observations) {
+  constexpr double kRangesAway = 5;
+  constexpr Index kFewestRows = 8;
+  std::vector<IsolatedValue> result;
+  for (const Covariate& covariate : observations.covariates) {
+    if (covariate.derived || covariate.per_channel() || covariate.value.rows() < kFewestRows ||
+        observations.not_usable.contains(covariate.name))
+      continue;
+    std::vector<Index> order(static_cast<std::size_t>(covariate.value.rows()));
+    std::iota(order.begin(), order.end(), Index{0});
+    const auto at = [&](Index r) { return covariate.value(r, 0); };
+    std::sort(order.begin(), order.end(), [&](Index a, Index b) { return at(a) < at(b); });
+    const double low = at(order[1]), high = at(order[order.size() - 2]);
+    const auto consider = [&](Index row, double from, double to, double gap) {
+      if (to > from && gap > kRangesAway * (to - from))
+        result.push_back(
+            {observations.name[static_cast<std::size_t>(row)], covariate.name, at(row), from, to});
+    };
+    consider(order.front(), low, at(order.back()), low - at(order.front()));
+    consider(order.back(), at(order.front()), high, at(order.back()) - high);
+  }
+  return result;
 }
 
 }  // namespace tunnelrig

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <set>
 
 #include <fmt/format.h>
@@ -65,7 +66,7 @@ class Evaluation {
   /// Fills one entry of every component.
   void evaluate(Index row, Index channel, TermResponse& response) {
     Sample sample = sample_of(row, channel);
-    const double force = predicted_(row, channel);
+    const double force = force_of(row, channel);
     const double duration = observations_.duration_s(row);
     if (!term_.effect->within_time() || duration == 0) {
       put(row, channel, 0, change(sample, force), 1, response);
@@ -80,13 +81,17 @@ class Evaluation {
   }
 
  private:
+  double force_of(Index row, Index channel) const {
+    return predicted_(row, channel) * (observations_.sign.size() > 0 ? observations_.sign(row) : 1);
+  }
+
   Sample sample_of(Index row, Index channel) {
     for (std::size_t k = 0; k < covariates_.size(); ++k) x_[k] = covariates_[k]->at(row, channel);
     const int before = observations_.previous[static_cast<std::size_t>(row)];
     return {.x = x_,
             .reference = reference_,
-            .previous_N = before < 0 ? std::numeric_limits<double>::quiet_NaN() : predicted_(before, channel),
-            .other_N = term_.other < 0 ? 0 : predicted_(row, term_.other),
+            .previous_N = before < 0 ? std::numeric_limits<double>::quiet_NaN() : force_of(before, channel),
+            .other_N = term_.other < 0 ? 0 : force_of(row, term_.other),
             .newtons_per_volt =
                 channel < observations_.newtons_per_volt.size() ? observations_.newtons_per_volt(channel) : 1,
             .rig = &observations_.rig};
@@ -141,6 +146,12 @@ bool forces_differ(const Observations& observations) {
   double variance = 0, noise = 0;
   const double n = static_cast<double>(observations.rows()), groups = observations.groups();
   if (n <= groups) return true;
+  MatrixXd along_lines;  // where the baseline's lines, not its constants, are what makes forces differ
+  if (observations.slopes.cols() > 0) {
+    std::vector<int> rows(static_cast<std::size_t>(observations.rows()));
+    std::iota(rows.begin(), rows.end(), 0);
+    along_lines = predict_response(observations, {}, rows);
+  }
   for (Index c = 0; c < observations.channels(); ++c) {
     VectorXd sum = VectorXd::Zero(observations.groups()), count = sum;
     for (Index row = 0; row < observations.rows(); ++row) {
@@ -148,9 +159,11 @@ bool forces_differ(const Observations& observations) {
       count(observations.group[static_cast<std::size_t>(row)]) += 1;
     }
     const VectorXd constant = (sum.array() / count.array().max(1))(observations.group);
-    const VectorXd force = observations.multiplicative
-                               ? VectorXd(constant.array() + observations.known.col(c).array().log())
-                               : constant;
+    VectorXd force = observations.multiplicative
+                         ? VectorXd(constant.array() + observations.known.col(c).array().log())
+                         : constant;
+    if (along_lines.size() > 0)
+      force = observations.multiplicative ? VectorXd(along_lines.col(c).array().log()) : along_lines.col(c);
     variance += (force.array() - force.mean()).square().mean();
     noise += (observations.y.col(c) - constant).squaredNorm() / (n - groups) * groups / n;
   }
@@ -208,6 +221,9 @@ Testability testability(const Effect& effect, const Observations& observations) 
     if (const auto why = observations.not_usable.find(name); why != observations.not_usable.end())
       result.reason = name + " is " + why->second;
   }
+  // With the standard's air it is the drift of zero with temperature by another name.
+  if (effect.name == "temperature_gradient" && observations.assumed.contains("air_temperature_C"))
+    result.missing.emplace_back("air_temperature_C");
   if (effect.scope == EffectScope::kPair && observations.channels() < 2)
     result.reason = "the response has one channel";
   if (effect.tunnel_only &&
@@ -219,8 +235,9 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason = "the measured speed is part of the response";
   if (observations.coefficient && (effect.name == "nonlinearity" || effect.name == "bidirectional"))
     result.reason = "a coefficient is no force that a cell has read";
-  if (effect.needs_previous && observations.blocks_are_rows)
-    result.reason = "the rows have no order";
+  if (effect.needs_previous && std::all_of(observations.previous.begin(), observations.previous.end(),
+                                           [](int before) { return before < 0; }))
+    result.reason = "the rows have no order, which a condition run_order would give them";
   else if (effect.needs_previous && !forces_differ(observations))
     result.reason = "the forces differ too little beside their scatter for the run before to tell";
   return result;

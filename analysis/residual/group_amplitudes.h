@@ -1,0 +1,20 @@
+// An effect's amplitude where each group has its own.
+#pragma once
+
+#include "analysis/residual/joint_fit.h"
+
+#include <string>
+#include <vector>
+
+namespace tunnelrig {
+
+struct GroupEstimate {
+  std::string group;
+  double value = 0, low = 0, high = 0;  // 95 %
+};
+
+/// Of term t of the model, from `rows`; without groups that have too few of them.
+std::vector<GroupEstimate> estimate_by_group(const Observations& observations, const MeanModel& model,
+                                             std::size_t t, const std::vector<int>& rows);
+
+}  // namespace tunnelrig
