@@ -31,7 +31,18 @@ struct Source {
   double cell(Index r, const std::string& column) const {
     return table.sheet.number(rows[static_cast<std::size_t>(r)], column).value_or(kNaN);
   }
+  double converted(Index r, const TableColumn& column) const {
+    const double mechanical = column.column == table.schema.speed_column ? table.schema.speed_factor : 1;
+    return unit_from_name(column.unit).convert(cell(r, column.column)) * mechanical;
+  }
 };
+
+/// What the schema says of a column; a pure number where it says nothing.
+TableColumn described(const TableSchema& schema, const std::string& name) {
+  for (const TableColumn& column : schema.covariates)
+    if (column.column == name) return column;
+  return {.column = name, .unit = "1", .meaning = ""};
+}
 
 /// Leaves out rows whose motor stood.
 Source moving_rows(const ObservationTable& table, Observations& result) {
@@ -52,9 +63,9 @@ Source moving_rows(const ObservationTable& table, Observations& result) {
 /// A covariate's name: what it means where the schema says so, else its column.
 void add_covariates(const Source& source, Observations& result) {
   const TableSchema& schema = source.table.schema;
-  const auto add = [&](const std::string& name, const auto& value_of) {
+  const auto add = [&](const std::string& name, std::string_view unit, const auto& value_of) {
     if (result.find(name) != nullptr) return;
-    Covariate covariate{name, MatrixXd(source.count(), 1)};
+    Covariate covariate{.name = name, .value = MatrixXd(source.count(), 1), .unit = std::string(unit)};
     Index missing = 0;
     for (Index r = 0; r < source.count(); ++r) {
       covariate.value(r, 0) = value_of(r);
@@ -65,33 +76,30 @@ void add_covariates(const Source& source, Observations& result) {
       result.not_usable[name] = fmt::format("missing in {} of {} rows", missing, source.count());
     result.covariates.push_back(std::move(covariate));
   };
-  for (const TableColumn& column : schema.covariates) {
-    const Unit& unit = unit_from_name(column.unit);
-    add(column.meaning.empty() ? column.column : column.meaning,
-        [&](Index r) { return unit.convert(source.cell(r, column.column)); });
-  }
-  if (schema.speed_column) add("speed_rpm", [&](Index r) { return source.row(r).speed_rpm.value_or(kNaN); });
+  for (const TableColumn& column : schema.covariates)
+    add(column.meaning.empty() ? column.column : column.meaning, unit_after_conversion(column.unit),
+        [&](Index r) { return source.converted(r, column); });
   if (schema.diameter_column || schema.diameter_m)
-    add("propeller_diameter_m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); });
-  add("air_temperature_C", [&](Index r) { return source.row(r).air_temperature_C; });
+    add("propeller_diameter_m", "m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); });
+  add("air_temperature_C", "°C", [&](Index r) { return source.row(r).air_temperature_C; });
 }
 
 void set_response(const Source& source, const ObservationChoice& choice, Observations& result) {
-  const TableColumn& column = source.table.schema.response;
-  const bool own = choice.response.empty() || choice.response == column.column;
-  result.response = own ? column.column : choice.response;
-  if (!own) source.table.sheet.require(choice.response);
-  result.unit = own ? (column.meaning == "thrust_N" ? "N" : column.unit) : "";
+  const TableSchema& schema = source.table.schema;
+  const bool own = choice.response.empty() || choice.response == schema.response.column;
+  const TableColumn column = own ? schema.response : described(schema, choice.response);
+  result.response = column.column;
+  source.table.sheet.require(column.column);
+  result.unit = unit_after_conversion(column.unit);
   result.coefficient = own && column.meaning.starts_with("c_t");
   const MatrixXd ones = MatrixXd::Ones(source.count(), 1);
   result.value = result.known = ones;
   // C_T is what is constant where speed and diameter are known; a baseline in another column replaces that.
-  const bool reduced =
-      own && column.meaning == "thrust_N" && choice.baseline.empty() && source.table.schema.speed_column;
+  const bool reduced = own && column.meaning == "thrust_N" && choice.baseline.empty() && schema.speed_column;
   result.coefficient = result.coefficient || reduced;
   for (Index r = 0; r < source.count(); ++r) {
     const Observation& row = source.row(r);
-    result.value(r, 0) = own ? row.response : source.cell(r, choice.response);
+    result.value(r, 0) = source.converted(r, column);
     if (std::isnan(result.value(r, 0)))
       throw InputError::at(source.table.sheet.file, row.line, "the response {} is empty", result.response);
     if (!reduced || !row.speed_rpm || !row.diameter_m) continue;
