@@ -100,4 +100,13 @@ Observations observe_runs(const CampaignData& data, const ObservationChoice& cho
 /// All rows. Throws InputError likewise.
 Observations observe_table(const ObservationTable& table, const ObservationChoice& choice);
 
+/// How a table's rows belong together, those of a standing motor left out.
+struct TableParts {
+  int groups = 0, blocks = 0;
+};
+
+/// Throws InputError naming the schema's file and line where its groups, blocks or hold_out cannot be had of
+/// the table: at import, where they can still be mended.
+TableParts check_table(const ObservationTable& table);
+
 }  // namespace tunnelrig
