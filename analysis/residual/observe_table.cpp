@@ -77,8 +77,9 @@ void add_covariates(const Source& source, Observations& result) {
     result.covariates.push_back(std::move(covariate));
   };
   for (const TableColumn& column : schema.covariates)
-    add(column.meaning.empty() ? column.column : column.meaning, unit_after_conversion(column.unit),
-        [&](Index r) { return source.converted(r, column); });
+    if (column.column != result.response)  // which would explain itself
+      add(column.meaning.empty() ? column.column : column.meaning, unit_after_conversion(column.unit),
+          [&](Index r) { return source.converted(r, column); });
   if (schema.diameter_column || schema.diameter_m)
     add("propeller_diameter_m", "m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); });
   add("air_temperature_C", "°C", [&](Index r) { return source.row(r).air_temperature_C; });
@@ -256,7 +257,8 @@ void set_other_axes(const TableSchema& schema, const std::string& baseline, Obse
     if (quantity.empty() && unit_from_name(column.unit).quantity == unit_from_name("N").quantity)
       quantity = unit_from_name(column.unit).quantity;
   for (const TableColumn& column : schema.covariates)
-    if (column.column != baseline && !quantity.empty() && unit_from_name(column.unit).quantity == quantity)
+    if (column.column != baseline && column.column != result.response && !quantity.empty() &&
+        unit_from_name(column.unit).quantity == quantity)
       result.other_axes.push_back(column.meaning.empty() ? column.column : column.meaning);
 }
 

@@ -50,6 +50,7 @@ TEST(TableUnits, AColumnAsTheResponseIsConvertedAsTheSchemaSays) {
   const Observations described = observed("N", {.response = "h"});
   EXPECT_EQ(described.unit, "m");
   EXPECT_NEAR(described.value(1, 0), 0.02, 1e-12);
+  EXPECT_EQ(described.find("h"), nullptr) << "it would explain itself";
   const Observations plain = observed("N", {.response = "n"});
   EXPECT_EQ(plain.unit, "1");
   EXPECT_NEAR(plain.value(1, 0), 7700, 1e-9);
