@@ -110,7 +110,7 @@ TableReduction reduce_table_rows(const ObservationTable& table, Convention conve
   const std::string& meaning = table.schema.response.meaning;
   if (meaning != "thrust_N" && meaning != "c_t" && meaning != "c_t_helicopter" &&
       meaning != "c_t_propeller") {
-    throw InputError::in("table.toml",
+    throw InputError::in(table.schema.file,
                          "the response {} is no thrust and no thrust coefficient, so there is no C_T",
                          table.schema.response.column);
   }
@@ -135,7 +135,7 @@ TableReduction reduce_table_rows(const ObservationTable& table, Convention conve
     reduction.rows.push_back({i, row.group, row.speed_rpm.value_or(0), *c_t, row.line});
   }
   if (reduction.rows.empty()) {
-    throw InputError::in("table.toml",
+    throw InputError::in(table.schema.file,
                          "no row can be reduced: a speed above 0 and the propeller's diameter are required "
                          "([propeller] in the schema, or --propeller-diameter-m at import)");
   }

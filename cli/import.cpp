@@ -1,3 +1,4 @@
+#include "analysis/residual/observations.h"
 #include "analysis/run_summary.h"
 #include "cli/console.h"
 #include "cli/verb.h"
@@ -53,25 +54,56 @@ int import_folder(const ImportVerbOptions& options) {
   return kWell;
 }
 
-int import_rows(const ImportVerbOptions& options) {
-  std::size_t rows = 0;
-  if (options.format == "table") {
-    if (options.schema.empty())
-      throw InputError("--format table: --schema S.toml is required; it says what the columns are");
-    rows = import_table(options.source, options.schema, options.db, options.replace);
-  } else {
-    rows = import_rcbenchmark(options.source, options.db,
-                              {.replace = options.replace,
-                               .propeller_diameter_m = options.propeller_diameter_m,
-                               .pole_count = options.pole_count,
-                               .sweeps_csv = options.sweeps,
-                               .schema = options.schema});
-  }
+ObservationTable read_rows(const ImportVerbOptions& options) {
+  if (options.format == "rcbenchmark")
+    return read_rcbenchmark(options.source, {.propeller_diameter_m = options.propeller_diameter_m,
+                                             .pole_count = options.pole_count,
+                                             .sweeps_csv = options.sweeps,
+                                             .schema = options.schema});
+  if (options.schema.empty())
+    throw InputError("--format table: --schema S.toml is required; it says what the columns are");
+  return read_table(options.source, options.schema);
+}
+
+nlohmann::ordered_json column_json(const TableColumn& column) {
+  return {
+      {"column", column.column}, {"unit", unit_after_conversion(column.unit)}, {"meaning", column.meaning}};
+}
+
+/// "Tair [°C] as air_temperature_C", in the unit that it is kept in.
+std::string in_words(const TableColumn& column) {
+  const std::string_view unit = unit_after_conversion(column.unit);
+  return column.column + (unit == "1" ? "" : fmt::format(" [{}]", unit)) +
+         (column.meaning.empty() ? "" : " as " + column.meaning);
+}
+
+void print_rows(const ImportVerbOptions& options, const ObservationTable& table, const TableParts& parts) {
   if (options.json) {
-    fmt::print("{}\n", nlohmann::json{{"db", options.db}, {"observations", rows}}.dump(1));
-  } else {
-    fmt::print("{}: {} observations\n", options.db, rows);
+    nlohmann::ordered_json json{{"db", options.db},
+                                {"observations", table.rows.size()},
+                                {"groups", parts.groups},
+                                {"blocks", parts.blocks},
+                                {"response", column_json(table.schema.response)},
+                                {"covariates", nlohmann::ordered_json::array()}};
+    for (const TableColumn& column : table.schema.covariates)
+      json["covariates"].push_back(column_json(column));
+    fmt::print("{}\n", json.dump(1));
+    return;
   }
+  std::string covariates;
+  for (const TableColumn& column : table.schema.covariates)
+    covariates += (covariates.empty() ? "covariates " : ", ") + in_words(column);
+  fmt::print("{}: {} observations in {} {} and {} {}; response {}; {}\n", options.db, table.rows.size(),
+             parts.groups, parts.groups == 1 ? "group" : "groups", parts.blocks,
+             parts.blocks == 1 ? "block" : "blocks", in_words(table.schema.response),
+             covariates.empty() ? "no covariates" : covariates);
+}
+
+int import_rows(const ImportVerbOptions& options) {
+  const ObservationTable table = read_rows(options);
+  const TableParts parts = check_table(table);
+  store_table(table, options.db, options.replace);
+  print_rows(options, table, parts);
   return kWell;
 }
 

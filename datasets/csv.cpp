@@ -103,6 +103,19 @@ void check_encoding(std::string_view text, const std::string& file) {
   }
 }
 
+/// "" where commas separate the header's cells, as they must; else what to do about it.
+std::string_view separator_advice(const std::vector<std::string>& columns) {
+  const auto count = [&](char separator) {
+    std::size_t found = 0;
+    for (const std::string& column : columns)
+      found += static_cast<std::size_t>(std::count(column.begin(), column.end(), separator));
+    return found;
+  };
+  if (count(';') >= columns.size()) return "; the header looks separated by semicolons: commas are needed";
+  if (count('\t') >= columns.size()) return "; the header looks separated by tabs: commas are needed";
+  return "";
+}
+
 void check_header(const Sheet& sheet) {
   for (std::size_t i = 0; i < sheet.columns.size(); ++i) {
     if (std::find(sheet.columns.begin(), sheet.columns.begin() + static_cast<std::ptrdiff_t>(i),
@@ -132,7 +145,7 @@ std::optional<std::size_t> Sheet::find(std::string_view column) const {
 
 std::size_t Sheet::require(std::string_view column) const {
   if (const auto found = find(column)) return *found;
-  throw InputError::at(file, 1, "the required column {} is missing", column);
+  throw InputError::at(file, 1, "the required column {} is missing{}", column, separator_advice(columns));
 }
 
 std::size_t Sheet::ensure(std::string_view column) {
@@ -189,8 +202,8 @@ Sheet parse_csv(std::string_view text, const std::string& file) {
     std::vector<std::string> cells = scanner.record();
     if (cells.size() == 1 && trimmed(cells[0]).empty() && sheet.columns.size() > 1) continue;
     if (cells.size() != sheet.columns.size()) {
-      throw InputError::at(file, line, "{} cells where the header has {} columns", cells.size(),
-                           sheet.columns.size());
+      throw InputError::at(file, line, "{} cells where the header has {} columns{}", cells.size(),
+                           sheet.columns.size(), separator_advice(sheet.columns));
     }
     sheet.rows.push_back({std::move(cells), line});
   }

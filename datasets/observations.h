@@ -25,6 +25,12 @@ struct TableColumn {
 
 inline constexpr std::string_view kTableFormat = "tunnelrig-table/1";
 
+/// "bins(COLUMN, N)": N parts of equal size by the column's value.
+struct Bins {
+  std::string column;
+  int count = 0;
+};
+
 /// table.toml.
 struct TableSchema {
   std::string name;
@@ -40,7 +46,9 @@ struct TableSchema {
   std::optional<double> diameter_m;  // of all rows
   double air_temperature_C = 15;     // of all rows, where no column says
   double air_pressure_Pa = 101325;
-  std::string toml;
+  std::optional<Bins> bins;  // where the blocks are
+  std::string toml, file;    // its text, and what messages call it
+  int groups_line = 0, blocks_line = 0, hold_out_line = 0;
 };
 
 /// Throws InputError naming file, line and key.
@@ -69,13 +77,10 @@ ObservationTable read_observations(const Sheet& sheet, const TableSchema& schema
 /// The table that a campaign file holds; throws InputError where it holds none.
 ObservationTable observations_of(const CampaignFile& file);
 
-/// `import --format table`: any CSV with a schema. Returns the number of rows.
-std::size_t import_table(const std::filesystem::path& csv, const std::filesystem::path& schema,
-                         const std::filesystem::path& file, bool replace);
+/// `import --format table`: any CSV with a schema.
+ObservationTable read_table(const std::filesystem::path& csv, const std::filesystem::path& schema);
 
-/// Stores a sheet and its schema as a new campaign file, once they fit each other. Returns the number of
-/// rows.
-std::size_t store_table(const Sheet& sheet, const TableSchema& schema, const std::filesystem::path& file,
-                        bool replace);
+/// Stores a table as a new campaign file.
+void store_table(const ObservationTable& table, const std::filesystem::path& file, bool replace);
 
 }  // namespace tunnelrig

@@ -1,7 +1,6 @@
 #include "datasets/rcbenchmark.h"
 
 #include "datasets/error.h"
-#include "datasets/observations.h"
 
 #include <algorithm>
 
@@ -99,8 +98,7 @@ std::string sweep_schema(const Sheet& all, const SweepOptions& options, const st
 
 }  // namespace
 
-std::size_t import_rcbenchmark(const std::filesystem::path& source, const std::filesystem::path& file,
-                               const SweepOptions& options) {
+ObservationTable read_rcbenchmark(const std::filesystem::path& source, const SweepOptions& options) {
   Sheet sweeps;
   if (!options.sweeps_csv.empty()) {
     sweeps = read_csv(options.sweeps_csv);
@@ -111,9 +109,8 @@ std::size_t import_rcbenchmark(const std::filesystem::path& source, const std::f
     append_sweep(all, read_csv(path), sweeps, path.filename().string());
   const std::string toml =
       options.schema.empty() ? sweep_schema(all, options, source.string()) : read_text(options.schema);
-  return store_table(
-      all, parse_table_schema(toml, options.schema.empty() ? "table.toml" : options.schema.string()), file,
-      options.replace);
+  const std::string name = options.schema.empty() ? "the headers' schema" : options.schema.string();
+  return read_observations(all, parse_table_schema(toml, name));
 }
 
 }  // namespace tunnelrig

@@ -1,13 +1,14 @@
 // RCbenchmark/Tyto sweeps: CSV files whose headers carry their units.
 #pragma once
 
+#include "datasets/observations.h"
+
 #include <filesystem>
 #include <optional>
 
 namespace tunnelrig {
 
 struct SweepOptions {
-  bool replace = false;
   std::optional<double> propeller_diameter_m;
   std::optional<int> pole_count;     // where the speed column holds electrical revolutions
   std::filesystem::path sweeps_csv;  // what is known of each file: `file` and further columns
@@ -15,9 +16,7 @@ struct SweepOptions {
 };
 
 /// `import --format rcbenchmark`: one RCbenchmark/Tyto sweep or a folder of them, units in the header. The
-/// rows are stacked under the columns `file`, those of `sweeps_csv`, and the sweeps' own. Returns the number
-/// of rows.
-std::size_t import_rcbenchmark(const std::filesystem::path& source, const std::filesystem::path& file,
-                               const SweepOptions& options);
+/// rows are stacked under the columns `file`, those of `sweeps_csv`, and the sweeps' own.
+ObservationTable read_rcbenchmark(const std::filesystem::path& source, const SweepOptions& options);
 
 }  // namespace tunnelrig

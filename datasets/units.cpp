@@ -13,7 +13,7 @@ constexpr double kGravity = 9.80665;   // m/s², standard
 constexpr double kPound = 0.45359237;  // kg
 constexpr double kPi = std::numbers::pi;
 
-constexpr std::array<Unit, 56> kUnits = {{
+constexpr std::array<Unit, 62> kUnits = {{
     {"1", "number", 1, 0},
     {"", "number", 1, 0},
     {"%", "number", 0.01, 0},
@@ -37,9 +37,9 @@ constexpr std::array<Unit, 56> kUnits = {{
     {"in", "length", 0.0254, 0},
     {"ft", "length", 0.3048, 0},
     {"m2", "area", 1, 0},
+    {"°C", "temperature", 1, 0},
     {"degC", "temperature", 1, 0},
     {"C", "temperature", 1, 0},
-    {"°C", "temperature", 1, 0},
     {"ºC", "temperature", 1, 0},
     {"K", "temperature", 1, -273.15},
     {"degF", "temperature", 5.0 / 9, -160.0 / 9},
@@ -53,6 +53,10 @@ constexpr std::array<Unit, 56> kUnits = {{
     {"kg/m3", "density", 1, 0},
     {"V", "voltage", 1, 0},
     {"mV", "voltage", 1e-3, 0},
+    {"V/V", "voltage ratio", 1, 0},
+    {"mV/V", "voltage ratio", 1e-3, 0},
+    {"uV/V", "voltage ratio", 1e-6, 0},
+    {"µV/V", "voltage ratio", 1e-6, 0},
     {"counts", "number", 1, 0},
     {"A", "current", 1, 0},
     {"W", "power", 1, 0},
@@ -67,8 +71,10 @@ constexpr std::array<Unit, 56> kUnits = {{
     {"kt", "velocity", 1852.0 / 3600, 0},
     {"km/h", "velocity", 1 / 3.6, 0},
     {"mph", "velocity", 0.44704, 0},
+    {"rad", "angle", 1, 0},
     {"deg", "angle", kPi / 180, 0},
     {"N·m", "torque", 1, 0},
+    {"N/W", "efficiency", 1, 0},
     {"gf/W", "efficiency", kGravity * 1e-3, 0},
 }};
 
@@ -82,6 +88,16 @@ const Unit& unit_from_name(std::string_view name) {
   names.reserve(kUnits.size());
   for (const Unit& unit : kUnits) names.push_back(unit.name);
   throw InputError(fmt::format("'{}' is not a known unit; known are {}", name, fmt::join(names, " ")));
+}
+
+std::string_view unit_after_conversion(std::string_view name) {
+  const Unit& unit = unit_from_name(name);
+  if (unit.quantity == "voltage ratio") return "1";
+  return std::find_if(kUnits.begin(), kUnits.end(),
+                      [&](const Unit& other) {
+                        return other.quantity == unit.quantity && other.factor == 1 && other.offset == 0;
+                      })
+      ->name;
 }
 
 std::string_view unit_in_header(std::string_view header) {

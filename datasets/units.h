@@ -21,6 +21,9 @@ struct Unit {
 /// The unit of that name ("gf", "rpm", "in", "degC", "%", …); throws InputError listing what is known.
 const Unit& unit_from_name(std::string_view name);
 
+/// The unit that values of this one are in once converted: "N" for "gf", "1" for "%".
+std::string_view unit_after_conversion(std::string_view name);
+
 /// "Thrust (gf)" → "gf"; empty where the header carries no unit in parentheses.
 std::string_view unit_in_header(std::string_view header);
 

@@ -3,6 +3,7 @@
 #include "analysis/residual/expression.h"
 #include "datasets/csv.h"
 #include "datasets/error.h"
+#include "datasets/toml_keys.h"
 
 #include <algorithm>
 #include <array>
@@ -59,10 +60,7 @@ class Reader {
   }
 
   void only(std::initializer_list<std::string_view> keys) const {
-    for (const auto& [key, value] : table_)
-      if (std::find(keys.begin(), keys.end(), key.str()) == keys.end())
-        throw InputError::at(file_, line_of(value), "{}: {} is no key here; known are {}", name_, key.str(),
-                             fmt::join(keys, ", "));
+    require_known_keys(table_, name_, file_, keys);
   }
 
   [[noreturn]] void fail(std::string_view key, const std::string& rule) const {

@@ -138,7 +138,7 @@ Json documents_section(const CampaignFile& file) {
 
 Json table_section(const ObservationTable& table, const TableReduction& reduction) {
   Json json{{"response", table.schema.response.column},
-            {"response_unit", table.schema.response.unit},
+            {"response_unit", table.schema.response.unit == "1" ? "" : table.schema.response.unit},
             {"convention", name_of(reduction.convention)},
             {"reduced", reduction.rows.size()},
             {"unknown", reduction.unknown},

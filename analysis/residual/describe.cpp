@@ -15,7 +15,14 @@ using Eigen::VectorXd;
 UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
                           const std::vector<int>& rows) {
   constexpr int kPoints = 25;
-  UnknownStructure result{found.curve.covariate, found.curve.rotor, found.p, 0, {}, found.instead_of};
+  UnknownStructure result{.covariate = found.curve.covariate,
+                          .covariate_unit = {},
+                          .rotor = found.curve.rotor,
+                          .p_value = found.p,
+                          .shape = {},
+                          .instead_of = found.instead_of};
+  if (const Covariate* covariate = observations.find(result.covariate))
+    result.covariate_unit = covariate->unit;
   const Components y = difference(response_components(observations), fit.linear.offset);
   const AmplitudeFit amplitudes = fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);
   Index first = static_cast<Index>(fit.linear.columns.size());
@@ -57,7 +64,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
 
 UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual,
                                    const std::vector<int>& rows) {
-  UnknownStructure result{"session", -1, 0.025, 0, {}, {}};
+  UnknownStructure result{"session", "", -1, 0.025, 0, {}, {}};
   std::map<int, std::vector<double>> offsets;
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const double mean = -residual.row(static_cast<Index>(r)).mean();

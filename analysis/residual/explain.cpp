@@ -338,11 +338,14 @@ Observations without_set_aside(const Observations& observations, const Explanati
 std::vector<Effect> effects_of_other_axes(const Observations& observations) {
   std::vector<Effect> effects;
   for (const std::string& axis : observations.other_axes) {
+    const Covariate* load = observations.find(axis);
+    const bool same = load == nullptr || load->unit == observations.unit;
+    const std::string unit = same ? "1" : observations.unit + "/" + load->unit;
     effects.push_back(make_effect<OtherAxis>({.name = "crosstalk",
                                               .form = axis,
                                               .formula = "F + x F_other",
                                               .physics = "a load on another axis bends this one's spring",
-                                              .parameters = {{"coefficient", observations.unit, -1e12, 1e12}},
+                                              .parameters = {{"coefficient", unit, -1e12, 1e12}},
                                               .covariates = {axis},
                                               .additive = true,
                                               .sign_rule = "either",

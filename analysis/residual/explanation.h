@@ -47,7 +47,8 @@ struct ShapePoint {
 };
 
 struct UnknownStructure {
-  std::string covariate;  // as runs.csv has it, or session, run_order, time_in_run
+  std::string covariate;       // as runs.csv has it, or session, run_order, time_in_run
+  std::string covariate_unit;  // empty: the name says it, or it is not known
   int rotor = -1;
   double p_value = 1;
   double amplitude = 0;  // half of peak to peak, unit of the response

@@ -142,7 +142,11 @@ class Page {
   /// Points of one covariate: the residual with everything else in, and what this term makes of it.
   Json panel(const std::string& label, const std::string& covariate, const MatrixXd& x, int rotor,
              const MatrixXd& fitted) const {
-    Json json{{"label", label}, {"covariate", covariate}, {"rotor", rotor_number(rotor)}};
+    const Covariate* known = observations_.find(covariate);
+    Json json{{"label", label},
+              {"covariate", covariate},
+              {"covariate_unit", known == nullptr ? "" : known->unit},
+              {"rotor", rotor_number(rotor)}};
     for (Index c = 0; c < observations_.channels(); ++c) {
       if (rotor >= 0 && c != rotor) continue;
       for (const int row : rows_) {

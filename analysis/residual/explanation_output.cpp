@@ -54,11 +54,9 @@ Json unknown_json(const UnknownStructure& unknown) {
   Json shape = Json::array();
   for (const ShapePoint& point : unknown.shape)
     shape.push_back({finite(point.x), finite(point.y), finite(point.low), finite(point.high)});
-  return {{"covariate", unknown.covariate},
-          {"rotor", rotor_json(unknown.rotor)},
-          {"p_value", finite(unknown.p_value)},
-          {"amplitude", finite(unknown.amplitude)},
-          {"shape", shape},
+  return {{"covariate", unknown.covariate},         {"covariate_unit", unknown.covariate_unit},
+          {"rotor", rotor_json(unknown.rotor)},     {"p_value", finite(unknown.p_value)},
+          {"amplitude", finite(unknown.amplitude)}, {"shape", shape},
           {"instead_of", unknown.instead_of}};
 }
 
@@ -146,7 +144,7 @@ std::string explanation_json(const Explanation& e) {
 }
 
 std::string explanation_text(const Explanation& e) {
-  const std::string unit = e.unit == "1" ? "" : " " + e.unit;
+  const std::string unit = e.unit.empty() || e.unit == "1" ? "" : " " + e.unit;
   std::string text =
       fmt::format("{}: response {}, baseline {}, {} runs in {} blocks\n\n{}: {}\n", e.campaign, e.response,
                   e.baseline, e.runs, e.blocks, e.verdict, verdict_in_words(e.verdict));

@@ -21,6 +21,7 @@ struct Covariate {
   std::string name;
   Eigen::MatrixXd value;  // runs × 1, or runs × channels where each channel has its own
   bool derived = false;   // made here, not a column of the sheet
+  std::string unit = {};  // empty: the name says it, or it is not known
 
   bool per_channel() const { return value.cols() > 1; }
   double at(Eigen::Index run, Eigen::Index channel) const { return value(run, per_channel() ? channel : 0); }
@@ -102,5 +103,14 @@ Observations observe_runs(const CampaignData& data, const ObservationChoice& cho
 
 /// All rows. Throws InputError likewise.
 Observations observe_table(const ObservationTable& table, const ObservationChoice& choice);
+
+/// How a table's rows belong together, those of a standing motor left out.
+struct TableParts {
+  int groups = 0, blocks = 0;
+};
+
+/// Throws InputError naming the schema's file and line where its groups, blocks or hold_out cannot be had of
+/// the table: at import, where they can still be mended.
+TableParts check_table(const ObservationTable& table);
 
 }  // namespace tunnelrig

@@ -31,7 +31,18 @@ struct Source {
   double cell(Index r, const std::string& column) const {
     return table.sheet.number(rows[static_cast<std::size_t>(r)], column).value_or(kNaN);
   }
+  double converted(Index r, const TableColumn& column) const {
+    const double mechanical = column.column == table.schema.speed_column ? table.schema.speed_factor : 1;
+    return unit_from_name(column.unit).convert(cell(r, column.column)) * mechanical;
+  }
 };
+
+/// What the schema says of a column; a pure number where it says nothing.
+TableColumn described(const TableSchema& schema, const std::string& name) {
+  for (const TableColumn& column : schema.covariates)
+    if (column.column == name) return column;
+  return {.column = name, .unit = "1", .meaning = ""};
+}
 
 /// Leaves out rows whose motor stood.
 Source moving_rows(const ObservationTable& table, Observations& result) {
@@ -52,9 +63,9 @@ Source moving_rows(const ObservationTable& table, Observations& result) {
 /// A covariate's name: what it means where the schema says so, else its column.
 void add_covariates(const Source& source, Observations& result) {
   const TableSchema& schema = source.table.schema;
-  const auto add = [&](const std::string& name, const auto& value_of) {
+  const auto add = [&](const std::string& name, std::string_view unit, const auto& value_of) {
     if (result.find(name) != nullptr) return;
-    Covariate covariate{name, MatrixXd(source.count(), 1)};
+    Covariate covariate{.name = name, .value = MatrixXd(source.count(), 1), .unit = std::string(unit)};
     Index missing = 0;
     for (Index r = 0; r < source.count(); ++r) {
       covariate.value(r, 0) = value_of(r);
@@ -65,34 +76,32 @@ void add_covariates(const Source& source, Observations& result) {
       result.not_usable[name] = fmt::format("missing in {} of {} rows", missing, source.count());
     result.covariates.push_back(std::move(covariate));
   };
-  for (const TableColumn& column : schema.covariates) {
-    const Unit& unit = unit_from_name(column.unit);
-    add(column.meaning.empty() ? column.column : column.meaning,
-        [&](Index r) { return unit.convert(source.cell(r, column.column)); });
-  }
-  if (schema.speed_column) add("speed_rpm", [&](Index r) { return source.row(r).speed_rpm.value_or(kNaN); });
+  for (const TableColumn& column : schema.covariates)
+    if (column.column != result.response)  // which would explain itself
+      add(column.meaning.empty() ? column.column : column.meaning, unit_after_conversion(column.unit),
+          [&](Index r) { return source.converted(r, column); });
   if (schema.diameter_column || schema.diameter_m)
-    add("propeller_diameter_m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); });
+    add("propeller_diameter_m", "m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); });
   if (result.find("air_temperature_C") == nullptr) result.assumed.insert("air_temperature_C");
-  add("air_temperature_C", [&](Index r) { return source.row(r).air_temperature_C; });
+  add("air_temperature_C", "°C", [&](Index r) { return source.row(r).air_temperature_C; });
 }
 
 void set_response(const Source& source, const ObservationChoice& choice, Observations& result) {
-  const TableColumn& column = source.table.schema.response;
-  const bool own = choice.response.empty() || choice.response == column.column;
-  result.response = own ? column.column : choice.response;
-  if (!own) source.table.sheet.require(choice.response);
-  result.unit = own ? (column.meaning == "thrust_N" ? "N" : column.unit) : "";
+  const TableSchema& schema = source.table.schema;
+  const bool own = choice.response.empty() || choice.response == schema.response.column;
+  const TableColumn column = own ? schema.response : described(schema, choice.response);
+  result.response = column.column;
+  source.table.sheet.require(column.column);
+  result.unit = unit_after_conversion(column.unit);
   result.coefficient = own && column.meaning.starts_with("c_t");
   const MatrixXd ones = MatrixXd::Ones(source.count(), 1);
   result.value = result.known = ones;
   // C_T is what is constant where speed and diameter are known; a baseline in another column replaces that.
-  const bool reduced =
-      own && column.meaning == "thrust_N" && choice.baseline.empty() && source.table.schema.speed_column;
+  const bool reduced = own && column.meaning == "thrust_N" && choice.baseline.empty() && schema.speed_column;
   result.coefficient = result.coefficient || reduced;
   for (Index r = 0; r < source.count(); ++r) {
     const Observation& row = source.row(r);
-    result.value(r, 0) = own ? row.response : source.cell(r, choice.response);
+    result.value(r, 0) = source.converted(r, column);
     if (std::isnan(result.value(r, 0)))
       throw InputError::at(source.table.sheet.file, row.line, "the response {} is empty", result.response);
     if (!reduced || !row.speed_rpm || !row.diameter_m) continue;
@@ -132,36 +141,46 @@ int index_in(std::map<std::string, int>& known, std::vector<std::string>& names,
   return found->second;
 }
 
-/// "bins(COLUMN, N)": N parts of equal size by the column's value.
-std::vector<int> bins(const Source& source, const std::string& column, int count) {
+/// Does what a key of the schema asks for; what goes wrong is put down to that key.
+template <class Work>
+void as_schema_says(const TableSchema& schema, int line, const std::string& key, const std::string& value,
+                    const Work& work) {
+  try {
+    work();
+  } catch (const InputError& error) {
+    throw InputError::at(schema.file, line, "{} = \"{}\": {}", key, value, error.what());
+  }
+}
+
+std::vector<int> binned(const Source& source, const Bins& bins) {
   std::vector<std::size_t> order(source.rows.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return source.cell(static_cast<Index>(a), column) < source.cell(static_cast<Index>(b), column);
-  });
+  std::vector<double> value;
+  for (Index r = 0; r < source.count(); ++r)
+    value.push_back(source.table.sheet.require_number(source.rows[static_cast<std::size_t>(r)], bins.column));
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return value[a] < value[b]; });
   std::vector<int> bin(order.size());
   for (std::size_t k = 0; k < order.size(); ++k)
-    bin[order[k]] = static_cast<int>(k * static_cast<std::size_t>(count) / order.size());
+    bin[order[k]] = static_cast<int>(k * static_cast<std::size_t>(bins.count) / order.size());
   return bin;
 }
 
 void set_blocks(const Source& source, Observations& result) {
-  const std::string& blocks = source.table.schema.blocks;
-  std::map<std::string, int> known;
-  if (blocks.starts_with("bins(")) {
-    const auto comma = blocks.rfind(',');
-    std::string column = blocks.substr(5, comma - 5);
-    while (!column.empty() && column.back() == ' ') column.pop_back();
-    const int count = std::stoi(blocks.substr(comma + 1));
-    result.block = bins(source, column, count);
-    for (int b = 0; b < count; ++b) result.block_name.push_back(fmt::format("{} {}", column, b + 1));
+  const TableSchema& schema = source.table.schema;
+  if (schema.bins) {
+    as_schema_says(schema, schema.blocks_line, "blocks", schema.blocks,
+                   [&] { result.block = binned(source, *schema.bins); });
+    for (int b = 0; b < schema.bins->count; ++b)
+      result.block_name.push_back(fmt::format("{} {}", schema.bins->column, b + 1));
     return;
   }
-  result.blocks_are_rows = blocks == "rows";
+  std::map<std::string, int> known;
+  result.blocks_are_rows = schema.blocks == "rows";
   for (Index r = 0; r < source.count(); ++r) {
     const std::size_t sheet_row = source.rows[static_cast<std::size_t>(r)];
     const std::string name =
-        result.blocks_are_rows ? std::to_string(r) : source.table.sheet.text(sheet_row, blocks);
+        result.blocks_are_rows ? std::to_string(r) : source.table.sheet.text(sheet_row, schema.blocks);
     result.block.push_back(index_in(known, result.block_name, name));
   }
 }
@@ -191,10 +210,8 @@ VectorXd ranks(const Source& source, const Observations& result, const std::stri
   return rank;
 }
 
-void set_hold_out(const Source& source, Observations& result) {
-  const std::string& text = source.table.schema.hold_out;
-  if (text.empty()) return;
-  const Expression expression(text, "table.toml: hold_out");
+std::vector<bool> held_out_rows(const Source& source, const Observations& result,
+                                const Expression& expression) {
   std::vector<VectorXd> columns;
   for (const std::string& name : expression.names()) {
     const bool rank = name.starts_with("rank(");
@@ -205,13 +222,36 @@ void set_hold_out(const Source& source, Observations& result) {
     columns.push_back(rank ? ranks(source, result, column) : values);
   }
   std::vector<double> values(columns.size());
+  std::vector<bool> held_out;
   for (Index r = 0; r < source.count(); ++r) {
     for (std::size_t k = 0; k < columns.size(); ++k) values[k] = columns[k](r);
-    result.held_out.push_back(expression(values) != 0);
+    const double held = expression(values);
+    if (held != 0 && held != 1)
+      throw InputError::at(source.table.sheet.file, source.row(r).line,
+                           "this is {:g} here, neither true nor false; write a comparison", held);
+    held_out.push_back(held != 0);
   }
-  if (std::none_of(result.held_out.begin(), result.held_out.end(), [](bool held) { return held; }) ||
-      std::all_of(result.held_out.begin(), result.held_out.end(), [](bool held) { return held; }))
-    throw InputError::in("table.toml", "hold_out = \"{}\" takes all rows or none", text);
+  const auto count = std::count(held_out.begin(), held_out.end(), true);
+  if (count == 0 || count == source.count()) throw InputError("this takes all rows or none");
+  return held_out;
+}
+
+void set_hold_out(const Source& source, Observations& result) {
+  const TableSchema& schema = source.table.schema;
+  if (schema.hold_out.empty()) return;
+  const Expression expression(schema.hold_out,
+                              fmt::format("{}:{}: hold_out", schema.file, schema.hold_out_line));
+  as_schema_says(schema, schema.hold_out_line, "hold_out", schema.hold_out,
+                 [&] { result.held_out = held_out_rows(source, result, expression); });
+}
+
+/// A baseline of its own for each row leaves nothing to compare.
+void check_groups(const TableSchema& schema, const Observations& result) {
+  if (schema.groups.empty() || result.group_name.size() < result.group.size()) return;
+  throw InputError::at(schema.file, schema.groups_line,
+                       "groups = [\"{}\"]: every row is a group of its own, and a group of one row tells "
+                       "nothing; name columns that rows have in common",
+                       fmt::join(schema.groups, "\", \""));
 }
 
 /// Columns of the same quantity as the baseline's, for crosstalk.
@@ -224,7 +264,8 @@ void set_other_axes(const TableSchema& schema, const std::string& baseline, Obse
     if (quantity.empty() && unit_from_name(column.unit).quantity == unit_from_name("N").quantity)
       quantity = unit_from_name(column.unit).quantity;
   for (const TableColumn& column : schema.covariates)
-    if (column.column != baseline && !quantity.empty() && unit_from_name(column.unit).quantity == quantity)
+    if (column.column != baseline && column.column != result.response && !quantity.empty() &&
+        unit_from_name(column.unit).quantity == quantity)
       result.other_axes.push_back(column.meaning.empty() ? column.column : column.meaning);
 }
 
@@ -301,6 +342,15 @@ void set_baseline(const Source& source, const ObservationChoice& choice, Observa
 }
 
 }  // namespace
+
+TableParts check_table(const ObservationTable& table) {
+  Observations result;
+  const Source source = moving_rows(table, result);
+  set_belonging(source, result);
+  check_groups(table.schema, result);
+  set_hold_out(source, result);
+  return {result.groups(), result.blocks()};
+}
 
 Observations observe_table(const ObservationTable& table, const ObservationChoice& choice) {
   Observations result;

@@ -155,9 +155,13 @@ VectorXd distances(const Observations& observations, const Term& first, const Te
   return squares.cwiseSqrt();
 }
 
-std::string in_words(const SeparatingRun& run) {
+std::string in_words(const SeparatingRun& run, const Observations& observations) {
   std::string text = "a run at " + run.location;
-  for (const auto& [name, value] : run.setting) text += fmt::format(", {} = {:.4g}", name, value);
+  for (const auto& [name, value] : run.setting) {
+    const Covariate* covariate = observations.find(name);
+    const std::string unit = covariate == nullptr || covariate->unit == "1" ? "" : covariate->unit;
+    text += fmt::format(", {} = {:.4g}{}{}", name, value, unit.empty() ? "" : " ", unit);
+  }
   return text + fmt::format(", beside an ordinary one there: the predictions differ by {:.1f} σ",
                             run.expected_sigma);
 }
@@ -189,7 +193,7 @@ std::optional<SeparatingRun> separating_run(const Observations& observations, co
       if (value != settings[ordinary[s]].covariates.at(name)) best.setting[name] = value;
   }
   if (!(best.expected_sigma > 0)) return {};
-  best.text = in_words(best);
+  best.text = in_words(best, observations);
   return best;
 }
 

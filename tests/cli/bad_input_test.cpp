@@ -131,6 +131,30 @@ TEST_F(BadInput, AReportOfNothingAndFiguresThatNoPaperHas) {
               HasSubstr("f: figures cannot be written here"));
 }
 
+TEST_F(BadInput, ASchemaThatTheTableDoesNotBear) {
+  const std::string schema =
+      "format = \"tunnelrig-table/1\"\ngroups = [\"g\"]\n[response]\ncolumn = \"y\"\nunit = \"gf\"\n"
+      "[[covariates]]\ncolumn = \"h\"\nunit = \"%\"\nmeaning = \"relative_humidity\"\n";
+  write_text(folder / "t.csv", "g,y,h\na,10,41\na,11,43\nb,12,44\nb,13,45\n");
+  const std::string verb = "import t.csv --format table --schema s.toml --db c.db";
+  const auto refused = [&](const std::string& from, const std::string& to) {
+    std::string text = schema;
+    replace(text, from, to);
+    write_text(folder / "s.toml", text);
+    return refusal_of(verb, {"t.csv", "s.toml"});
+  };
+  EXPECT_THAT(refused("groups", "group"), HasSubstr("s.toml:2: the file: group is no key here"));
+  EXPECT_THAT(refused("\"%\"", "\"1\""), HasSubstr("t.csv:2: column h: 41 is no relative humidity"));
+  EXPECT_THAT(refused("\"g\"]", "\"g\", \"h\"]"), HasSubstr("s.toml:2: groups = [\"g\", \"h\"]"));
+  EXPECT_THAT(refused("groups", "hold_out = \"h >\"\ngroups"), HasSubstr("s.toml:2: hold_out: h > is no"));
+  write_text(folder / "s.toml", schema);
+  const ProgramResult imported = test::run_program(folder.path(), verb);
+  EXPECT_EQ(imported.code, 0) << imported.error;
+  EXPECT_EQ(
+      imported.out,
+      "c.db: 4 observations in 2 groups and 4 blocks; response y [N]; covariates h as relative_humidity\n");
+}
+
 TEST_F(BadInput, CalibrationThatSaysNothing) {
   campaign.calibration_csv =
       "cell,applied_force_N,voltage_V\n1,5,1.5\n1,6,1.8\n2,5,1.5\n2,6,1.8\n3,5,1.5\n3,6,1.8\n4,5,1.5\n4,6,1."

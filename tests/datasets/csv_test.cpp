@@ -60,5 +60,18 @@ TEST(Csv, NumbersAreStrict) {
   }
 }
 
+TEST(Csv, OtherSeparatorsAreNamed) {
+  const auto missing = [](const std::string& text) {
+    return message_of([&] { (void)parse_csv(text, "t.csv").require("y"); });
+  };
+  EXPECT_THAT(
+      missing("g;y;x\na;1;0.1\n"),
+      HasSubstr("t.csv:1: the required column y is missing; the header looks separated by semicolons"));
+  EXPECT_THAT(missing("g\ty\tx\na\t1\t0.1\n"), HasSubstr("separated by tabs: commas are needed"));
+  EXPECT_THAT(missing("g;y;x\na;1,5;0,1\n"),
+              HasSubstr("3 cells where the header has 1 columns; the header looks separated by semicolons"));
+  EXPECT_THAT(missing("g,x\na,1\n"), testing::EndsWith("the required column y is missing"));
+}
+
 }  // namespace
 }  // namespace tunnelrig

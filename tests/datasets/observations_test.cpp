@@ -85,9 +85,10 @@ TEST(Observations, StoredAndReadBack) {
   const test::TemporaryFolder folder;
   write_text(folder / "t.csv", kTable);
   write_text(folder / "s.toml", kSchema);
-  EXPECT_EQ(import_table(folder / "t.csv", folder / "s.toml", folder / "c.db", false), 2u);
-  EXPECT_THAT(message_of([&] { import_table(folder / "t.csv", folder / "s.toml", folder / "c.db", false); }),
-              HasSubstr("already holds"));
+  const ObservationTable read = read_table(folder / "t.csv", folder / "s.toml");
+  EXPECT_EQ(read.rows.size(), 2u);
+  store_table(read, folder / "c.db", false);
+  EXPECT_THAT(message_of([&] { store_table(read, folder / "c.db", false); }), HasSubstr("already holds"));
   const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
   EXPECT_EQ(observations_of(file).rows.size(), 2u);
   EXPECT_THAT(message_of([&] { (void)file.info(); }),
@@ -100,8 +101,7 @@ TEST(Rcbenchmark, TakesSpeedFromTheProbeThatWasThere) {
              "Time (s),ESC signal (µs),Thrust (gf),Voltage (V),Motor Electrical Speed (RPM),Motor Optical "
              "Speed (RPM)\n"
              "0,1000,10,11,3000,0\n1,1200,40,11,6000,0\n");
-  import_rcbenchmark(folder / "s.csv", folder / "c.db", {.propeller_diameter_m = 0.127});
-  const auto table = observations_of(CampaignFile(folder / "c.db", CampaignFile::Access::kRead));
+  const auto table = read_rcbenchmark(folder / "s.csv", {.propeller_diameter_m = 0.127});
   EXPECT_EQ(table.rows[1].speed_rpm, 6000);
   EXPECT_EQ(table.rows[1].diameter_m, 0.127);
   EXPECT_EQ(table.rows[1].group, "s.csv");
@@ -115,23 +115,20 @@ TEST(Rcbenchmark, SweepsTableNamesGroups) {
     write_text(folder / "in" / name, "Thrust (N),Motor Optical Speed (RPM)\n1,3000\n");
   }
   write_text(folder / "sweeps.csv", "file,group,propeller_diameter_m\na.csv,G,0.1\nb.csv,G,0.2\n");
-  EXPECT_EQ(import_rcbenchmark(folder / "in", folder / "c.db", {.sweeps_csv = folder / "sweeps.csv"}), 2u);
+  store_table(read_rcbenchmark(folder / "in", {.sweeps_csv = folder / "sweeps.csv"}), folder / "c.db", false);
   const auto table = observations_of(CampaignFile(folder / "c.db", CampaignFile::Access::kRead));
   EXPECT_EQ(table.rows[0].group, "G");
   EXPECT_EQ(table.rows[1].diameter_m, 0.2);
   write_text(folder / "short.csv", "file,group\na.csv,G\n");
-  EXPECT_THAT(message_of([&] {
-                import_rcbenchmark(folder / "in", folder / "d.db", {.sweeps_csv = folder / "short.csv"});
-              }),
+  EXPECT_THAT(message_of([&] { read_rcbenchmark(folder / "in", {.sweeps_csv = folder / "short.csv"}); }),
               HasSubstr("has no row for b.csv"));
 }
 
 TEST(Rcbenchmark, StrawsonMotors) {
   SKIP_WITHOUT_SHARED_DATA();
-  const test::TemporaryFolder folder;
-  const auto rows = import_rcbenchmark(test::shared_data() / "strawson_motors/rawdata", folder / "c.db",
-                                       {.propeller_diameter_m = 0.127});
-  EXPECT_GT(rows, 2000u);
+  const auto table =
+      read_rcbenchmark(test::shared_data() / "strawson_motors/rawdata", {.propeller_diameter_m = 0.127});
+  EXPECT_GT(table.rows.size(), 2000u);
 }
 
 }  // namespace

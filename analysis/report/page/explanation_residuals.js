@@ -23,8 +23,9 @@ const plainUnits = {
   clip_fraction: '–'
 };
 
-/** "air_temperature_C [°C]"; columns that say nothing of their unit stand alone. */
-function covariateTitle(name) {
+/** "air_temperature_C [°C]"; what says nothing of its unit stands alone. A table's column has a unit of its own. */
+function covariateTitle(name, own) {
+  if (own && own !== '1') return `${plain(name)} [${plain(own)}]`;
   const suffix = Object.keys(suffixes).find((end) => name.endsWith(end));
   const unit = plainUnits[name] ?? suffixes[suffix];
   return plain(name) + (unit ? ` [${unit}]` : '');
@@ -110,7 +111,7 @@ function drawPanel(panel, which, reach) {
   return {
     data,
     layout: {
-      xaxis: axis(covariateTitle(panel.covariate), {zeroline: false}),
+      xaxis: axis(covariateTitle(panel.covariate, panel.covariate_unit), {zeroline: false}),
       yaxis: axis(residualTitle(), {range: [-reach, reach]}),
       showlegend: true,
       legend: {orientation: 'h', y: 1.02, yanchor: 'bottom'}

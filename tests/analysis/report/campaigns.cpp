@@ -192,7 +192,8 @@ void make_table(const std::filesystem::path& db, bool with_thrust) {
       csv += fmt::format("{},{},{:.6f}\n", name, speed_rpm, thrust_N);
     }
   }
-  store_table(parse_csv(csv, "table.csv"), parse_table_schema(schema, "table.toml"), db, false);
+  store_table(read_observations(parse_csv(csv, "table.csv"), parse_table_schema(schema, "table.toml")), db,
+              false);
 }
 
 nlohmann::ordered_json explanation(const std::string& verdict) {
