@@ -34,6 +34,7 @@ struct Bins {
 /// table.toml.
 struct TableSchema {
   std::string name;
+  std::string scatter;              // of the response: "relative", "absolute", or empty: as its unit suggests
   TableColumn response;             // meaning: thrust_N, c_t, c_t_helicopter, c_t_propeller, or empty
   std::vector<std::string> groups;  // columns that together name a group, which has its own baseline
   std::string blocks = "rows";      // a column, "rows", or "bins(column, n)"

@@ -218,8 +218,13 @@ TableSchema parse_table_schema(const std::string& text, const std::string& file)
   const toml::table* response = top.table("response");
   if (response == nullptr) throw InputError::at(file, 1, "the table [response] is required");
   const Reader of_response(*response, "response.", schema.file);
-  of_response.only({"column", "unit", "meaning"});
+  of_response.only({"column", "unit", "meaning", "scatter"});
   schema.response = of_response.column();
+  schema.scatter = of_response.string("scatter").value_or("");
+  if (!schema.scatter.empty() && schema.scatter != "relative" && schema.scatter != "absolute")
+    throw InputError::at(file, of_response.line_of("scatter"),
+                         "scatter = \"{}\"; write \"relative\" (it grows with the response) or \"absolute\"",
+                         schema.scatter);
   read_groups(document, top, schema);
   read_blocks(top, schema);
   schema.hold_out = top.string("hold_out").value_or("");

@@ -112,8 +112,11 @@ void set_response(const Source& source, const ObservationChoice& choice, Observa
 }
 
 /// A cell's volts scatter alike under any load; what a rotor gives scatters with its size.
-bool scatters_alike(const TableColumn& response) {
-  return unit_from_name(response.unit).quantity == unit_from_name("V").quantity;
+bool scatters_alike(const TableSchema& schema, const ObservationChoice& choice) {
+  if (!choice.response.empty() && choice.response != schema.response.column) return false;
+  if (choice.baseline.starts_with("power:")) return false;
+  if (!schema.scatter.empty()) return schema.scatter == "absolute";
+  return unit_from_name(schema.response.unit).quantity == unit_from_name("V").quantity;
 }
 
 /// Groups that pulled the other way are measured by magnitude; a response of both signs is kept as it is.
@@ -327,8 +330,7 @@ void set_baseline(const Source& source, const ObservationChoice& choice, Observa
     result.known.setOnes();
   }
   if (kind == "power" && !result.multiplicative)
-    throw InputError(fmt::format("--baseline {}: the response has both signs, or its scatter is not relative",
-                                 choice.baseline));
+    throw InputError(fmt::format("--baseline {}: the response has both signs", choice.baseline));
   result.slopes.resize(source.count(), 1);
   for (Index r = 0; r < source.count(); ++r) {
     const double x = source.cell(r, column);
@@ -347,7 +349,6 @@ TableParts check_table(const ObservationTable& table) {
   Observations result;
   const Source source = moving_rows(table, result);
   set_belonging(source, result);
-  check_groups(table.schema, result);
   set_hold_out(source, result);
   return {result.groups(), result.blocks()};
 }
@@ -357,13 +358,13 @@ Observations observe_table(const ObservationTable& table, const ObservationChoic
   result.campaign = table.schema.name;
   const Source source = moving_rows(table, result);
   set_belonging(source, result);
+  check_groups(table.schema, result);
   set_response(source, choice, result);
   if (!(result.value.maxCoeff() > result.value.minCoeff()))
     throw InputError(fmt::format("the response {} is the same in every row: there is nothing to explain",
                                  result.response));
   std::vector<std::size_t> odd;
-  const TableColumn& column = table.schema.response;
-  set_scale(result, result.response == column.column && scatters_alike(column), odd);
+  set_scale(result, scatters_alike(table.schema, choice), odd);
   add_covariates(source, result);
   set_previous(result);
   set_baseline(source, choice, result);

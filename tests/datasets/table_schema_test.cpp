@@ -33,8 +33,9 @@ std::string covariate(const std::string& column, const std::string& unit, const 
 TEST(TableSchema, UnknownKeysAreRefused) {
   EXPECT_THAT(refusal("block = \"g\"\n"),
               HasSubstr("s.toml:2: the file: block is no key here; known are format, name, groups, blocks"));
-  EXPECT_THAT(refusal("", "meanning = \"thrust_N\"\n"),
-              HasSubstr("s.toml:5: response: meanning is no key here; known are column, unit, meaning"));
+  EXPECT_THAT(
+      refusal("", "meanning = \"thrust_N\"\n"),
+      HasSubstr("s.toml:5: response: meanning is no key here; known are column, unit, meaning, scatter"));
   EXPECT_THAT(refusal("", "[[covariate]]\ncolumn = \"x\"\n"),
               HasSubstr("s.toml:5: the file: covariate is no key here"));
   EXPECT_THAT(refusal("", "[[covariates]]\ncolumn = \"x\"\nunits = \"V\"\n"),
@@ -99,10 +100,26 @@ TEST(TableSchema, ValuesThatTheirMeaningRulesOutAreRefused) {
   }
 }
 
-TEST(TableSchema, GroupsOfSingleRowsAreRefused) {
-  EXPECT_THAT(refusal("groups = [\"g\", \"x\"]\n"),
+/// They can be reduced, but nothing can be found out from them.
+TEST(TableSchema, GroupsOfSingleRowsAreNotExplained) {
+  const ObservationTable table = read("groups = [\"g\", \"x\"]\n");
+  EXPECT_EQ(check_table(table).groups, static_cast<int>(table.rows.size()));
+  EXPECT_THAT(message_of([&] { observe_table(table, {}); }),
               HasSubstr("s.toml:2: groups = [\"g\", \"x\"]: every row is a group of its own"));
-  EXPECT_EQ(check_table(read("groups = [\"g\"]\n")).groups, 2);
+}
+
+TEST(TableSchema, ScatterIsRelativeOrAbsolute) {
+  EXPECT_THAT(refusal("", "scatter = \"abs\"\n"),
+              HasSubstr("s.toml:5: scatter = \"abs\"; write \"relative\""));
+  EXPECT_TRUE(observe_table(read(""), {}).multiplicative);
+  EXPECT_FALSE(observe_table(read("", "scatter = \"absolute\"\n"), {}).multiplicative);
+  const std::string volts = kTop + "[response]\ncolumn = \"y\"\nunit = \"mV\"\n";
+  const auto of_volts = [&](const std::string& more) {
+    return observe_table(
+        read_observations(parse_csv(kTable, "t.csv"), parse_table_schema(volts + more, "s.toml")), {});
+  };
+  EXPECT_FALSE(of_volts("").multiplicative);
+  EXPECT_TRUE(of_volts("scatter = \"relative\"\n").multiplicative);
 }
 
 TEST(TableSchema, BlocksThatCannotBeHadAreRefused) {

@@ -1,0 +1,196 @@
+// Tables as others bring them: gross rows, a cell's volts, groups that differ, steps and trends.
+#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/simulated.h"
+#include "support/seeds.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+constexpr double kMiddle_V = 11.5;
+
+struct TablesTest : testing::Test {
+  std::mt19937_64 random{test::seed()};
+  std::normal_distribution<double> scatter;
+  std::uniform_real_distribution<double> even{0, 1};
+
+  static Observations observed(const std::string& csv, const std::string& schema) {
+    return observe_table(
+        read_observations(parse_csv(csv, "t.csv"),
+                          parse_table_schema("format = \"tunnelrig-table/1\"\n" + schema, "s.toml")),
+        {});
+  }
+  static Explanation explained(const Observations& o) {
+    SearchSettings settings;
+    settings.simulations = 199;
+    return explain(o, test::every_effect(), settings);
+  }
+  static std::string names(const Explanation& e) {
+    std::string all;
+    for (const AdoptedEffect& adopted : e.adopted) all += adopted.term.effect->name + " ";
+    return all;
+  }
+
+  /// Thrust by voltage, 96 rows in 12 blocks of 0.3 %; `wrong` multiplies the row on line 24.
+  Observations thrusts(double wrong) {
+    std::string csv = "b,V,y\n";
+    for (int r = 0; r < 96; ++r) {
+      const double volts = 10.5 + 2 * even(random);
+      const double force_N = 8 * std::pow(volts / kMiddle_V, 1.7) * (1 + 0.003 * scatter(random));
+      csv += fmt::format("{},{},{}\n", r / 8, volts, r == 22 ? wrong * force_N : force_N);
+    }
+    return observed(csv,
+                    "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+                    "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n");
+  }
+};
+
+TEST_F(TablesTest, ARowTenTimesTooLargeIsSetAside) {
+  const Observations o = thrusts(10);
+  const Explanation e = explained(o);
+  ASSERT_FALSE(e.suspect_rows.empty());
+  EXPECT_EQ(e.suspect_rows[0].row, "t.csv:24");
+  EXPECT_TRUE(e.suspect_rows[0].set_aside);
+  EXPECT_EQ(e.runs, 95);
+  EXPECT_EQ(names(e), "supply_voltage ");
+  EXPECT_NEAR(e.adopted[0].parameters[0].value, 1.7, 0.15);
+  EXPECT_TRUE(nlohmann::json::parse(explanation_json(e))["suspect_rows"][0]["set_aside"]);
+  EXPECT_EQ(e.residual_after.rows(), without_set_aside(o, e).rows());
+}
+
+TEST_F(TablesTest, RowsOffByATenthAreAsFarOffEitherWay) {
+  for (const double wrong : {1.1, 0.9}) {
+    const Explanation e = explained(thrusts(wrong));
+    ASSERT_FALSE(e.suspect_rows.empty()) << wrong;
+    EXPECT_EQ(e.suspect_rows[0].row, "t.csv:24");
+    EXPECT_NEAR(e.suspect_rows[0].studentised, (wrong > 1 ? 1 : -1) * 0.1 / 0.003, 20) << wrong;
+  }
+}
+
+TEST_F(TablesTest, RowsThatBelongAreNotSuspect) { EXPECT_TRUE(explained(thrusts(1)).suspect_rows.empty()); }
+
+/// A value ten times too large in a condition bends the model: what predicts worse than nothing is found
+/// anew.
+TEST_F(TablesTest, AConditionFarFromAllOthersIsSaid) {
+  Observations o = thrusts(1);
+  o.covariates[0].value(22, 0) *= 10;
+  const Explanation e = explained(o);
+  EXPECT_THAT(names(e), HasSubstr("supply_voltage"));
+  const bool aside =
+      !e.suspect_rows.empty() && e.suspect_rows[0].row == "t.csv:24" && e.suspect_rows[0].set_aside;
+  if (!aside) {
+    EXPECT_THAT(e.warnings, Contains(HasSubstr("of t.csv:24 is")));
+  }
+  EXPECT_LE(e.after.held_out_rmse, e.before.held_out_rmse);
+}
+
+/// A load cell in a chamber: both drifts are straight lines in temperature, told by how they go with the
+/// load.
+TEST_F(TablesTest, ZeroAndSpanDriftAreBothFound) {
+  std::string csv = "b,load,T,u\n";
+  for (int block = 0; block < 28; ++block) {
+    const double temperature = -10 + 60 * even(random);
+    for (int load = 0; load < 6; ++load) {
+      const double volts =
+          0.2e-3 + 2e-3 * load * (1 - 2.5e-4 * (temperature - 20)) + 4e-6 * (temperature - 20);
+      csv += fmt::format("{},{},{},{}\n", block, load, temperature, volts + 3e-6 * scatter(random));
+    }
+  }
+  const Explanation e = explained(
+      observed(csv,
+               "groups = [\"load\"]\nblocks = \"b\"\n[response]\ncolumn = \"u\"\nunit = \"V\"\n"
+               "[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\nmeaning = \"cell_temperature_C\"\n"));
+  ASSERT_EQ(e.adopted.size(), 2u) << names(e);
+  for (const AdoptedEffect& adopted : e.adopted) {
+    const bool zero = adopted.term.effect->name == "zero_drift_temperature";
+    EXPECT_TRUE(zero || adopted.term.effect->name == "span_drift_temperature") << names(e);
+    EXPECT_FALSE(adopted.term.per_group);
+    EXPECT_NEAR(adopted.parameters[0].value, zero ? 4e-6 : -2.5e-4, zero ? 4e-7 : 2e-5);
+  }
+  EXPECT_TRUE(std::none_of(e.adopted.begin(), e.adopted.end(), [](const AdoptedEffect& adopted) {
+    return adopted.term.effect->name == "temperature_gradient";
+  })) << "nobody recorded the air's temperature";
+}
+
+TEST_F(TablesTest, GroupsWithExponentsOfTheirOwnAreTold) {
+  std::string csv = "p,V,y\n";
+  for (int r = 0; r < 80; ++r) {
+    const double volts = 10.5 + 2 * even(random), exponent = r % 2 == 0 ? 1.4 : 2.0;
+    csv += fmt::format("p{},{},{}\n", r % 2, volts,
+                       (5 + r % 2) * std::pow(volts / kMiddle_V, exponent) * (1 + 0.002 * scatter(random)));
+  }
+  const Explanation e =
+      explained(observed(csv,
+                         "groups = [\"p\"]\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+                         "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n"));
+  ASSERT_EQ(names(e), "supply_voltage ");
+  const ParameterEstimate& exponent = e.adopted[0].parameters[0];
+  ASSERT_EQ(exponent.groups.size(), 2u);
+  EXPECT_EQ(exponent.groups[0].group, "p0");
+  EXPECT_NEAR(exponent.groups[0].value, 1.4, 0.05);
+  EXPECT_NEAR(exponent.groups[1].value, 2.0, 0.05);
+  EXPECT_NEAR(exponent.value, 1.7, 0.05);
+  EXPECT_LT(exponent.low, exponent.groups[0].value);
+  EXPECT_GT(exponent.high, exponent.groups[1].value);
+  EXPECT_EQ(
+      nlohmann::json::parse(explanation_json(e))["adopted"][0]["parameters"]["exponent"]["groups"].size(),
+      2u);
+}
+
+/// Runs of four rotors in 16 sessions, with their order as a condition.
+Observations ordered(std::mt19937_64& random) {
+  Observations o = test::simulate(
+      {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .sigma = 0.002, .session_ratio = 0.1},
+      random);
+  Covariate order{"run_order", Eigen::VectorXd::LinSpaced(o.rows(), 0, static_cast<double>(o.rows() - 1)),
+                  true};
+  o.covariates.push_back(order);
+  return o;
+}
+
+TEST_F(TablesTest, AGradualChangeIsNoStep) {
+  Observations o = ordered(random);
+  Eigen::MatrixXd y = o.y;
+  for (Eigen::Index row = 0; row < y.rows(); ++row)
+    y.row(row).array() -= 0.012 * std::pow(static_cast<double>(row) / static_cast<double>(y.rows()), 2.5);
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  EXPECT_EQ(names(e), "");
+  EXPECT_EQ(e.verdict, "unknown");
+}
+
+/// The search never sees the session in which the propeller was nicked; the final fit does.
+TEST_F(TablesTest, AStepInASealedSessionIsPlacedThere) {
+  Observations o = ordered(random);
+  const Seal seal = seal_blocks(o, SearchSettings{}.seed);
+  int first = -1;
+  for (const int row : seal.sealed) {
+    const int block = o.block[static_cast<std::size_t>(row)];
+    const bool start = o.block[static_cast<std::size_t>(row - (row > 0 ? 1 : 0))] != block;
+    if (start && block >= 5 && block <= 10) first = row;
+  }
+  ASSERT_GE(first, 0);
+  Eigen::MatrixXd y = o.y;
+  for (Eigen::Index row = first; row < y.rows(); ++row) y(row, 1) -= 0.008;
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.adopted.size(), 1u) << names(e);
+  EXPECT_EQ(e.adopted[0].term.rotor, 1);
+  EXPECT_TRUE(e.adopted[0].term.effect->has_change_point());
+  const ParameterEstimate& run = e.adopted[0].parameters[1];
+  EXPECT_EQ(run.value, first);
+  EXPECT_LE(run.low, first);
+  EXPECT_GE(run.high, first);
+}
+
+}  // namespace
+}  // namespace tunnelrig
