@@ -170,7 +170,11 @@ Components difference(const Components& a, const Components& b) {
 
 namespace {
 
+/// v = b + g T: what a cell reads without a load is no force.
+bool is_line(const Observations& observations) { return observations.baseline.starts_with("linear:"); }
+
 /// The part of the baseline's lines beyond its constants: of each group, its own slopes fitted to `rows`.
+/// From the group's mean, or where the baseline is a line from no load.
 MatrixXd along_slopes(const Observations& observations, const MatrixXd& residual,
                       const std::vector<int>& rows) {
   MatrixXd result = MatrixXd::Zero(residual.rows(), residual.cols());
@@ -185,7 +189,8 @@ MatrixXd along_slopes(const Observations& observations, const MatrixXd& residual
     const MatrixXd slope = (x.rowwise() - middle)
                                .completeOrthogonalDecomposition()
                                .solve(MatrixXd(y.rowwise() - y.colwise().mean()));
-    for (const int row : all.at(group)) result.row(row) = (observations.slopes.row(row) - middle) * slope;
+    const Eigen::RowVectorXd from = is_line(observations) ? Eigen::RowVectorXd::Zero(x.cols()) : middle;
+    for (const int row : all.at(group)) result.row(row) = (observations.slopes.row(row) - from) * slope;
   }
   return result;
 }
@@ -211,8 +216,9 @@ MatrixXd predict_response(const Observations& observations, const MeanModel& mod
     const Eigen::RowVectorXd overall = sum.colwise().sum() / count.sum();
     for (Index row = 0; row < residual.rows(); ++row) {
       const Index group = observations.group[static_cast<std::size_t>(row)];
-      const Eigen::RowVectorXd constant =
+      Eigen::RowVectorXd constant =
           count(group) > 0 ? Eigen::RowVectorXd(sum.row(group) / count(group)) : overall;
+      if (is_line(observations)) constant.setZero();
       predicted.row(row) = observations.multiplicative
                                ? Eigen::RowVectorXd(observations.known.row(row).array() *
                                                     (constant + added.row(row)).array().exp())

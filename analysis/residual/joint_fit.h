@@ -22,7 +22,8 @@ struct LinearModel {
   std::vector<Components> columns;  // derivatives by the terms' free parameters, then the curves' columns
 };
 
-/// Force (response) that baseline and terms predict, n × c: group constants from the mean over `rows`.
+/// Force (response) that baseline and terms predict, n × c: group constants and slopes fitted to `rows`; with
+/// a linear baseline without its zero, which is no force.
 Eigen::MatrixXd predict_response(const Observations& observations, const MeanModel& model,
                                  const std::vector<int>& rows);
 
