@@ -24,7 +24,7 @@ using testing::HasSubstr;
 struct SimulatedRun {
   int number = 0, session = 0;
   double supply_voltage_V = 16, air_temperature_C = 20;
-  double thrust_factor = 1;
+  double thrust_factor = 1, first_rotor_factor = 1;
   std::string extra;
 };
 
@@ -55,8 +55,9 @@ struct ExplainProgram : testing::Test {
                         location[i % 3], number / 3 + 1, session + 1, session + 1, 8 + i,
                         run.air_temperature_C, run.supply_voltage_V, run.extra);
         for (int rotor = 0; rotor < 4; ++rotor)
-          campaign.runs_csv +=
-              fmt::format(",{:.5f}", 7 * density * run.thrust_factor * (1 + offset + normal(0.002)));
+          campaign.runs_csv += fmt::format(",{:.5f}", 7 * density * run.thrust_factor *
+                                                          (rotor == 0 ? run.first_rotor_factor : 1) *
+                                                          (1 + offset + normal(0.002)));
         campaign.runs_csv += "\n";
       }
     }
@@ -110,6 +111,18 @@ TEST_F(ExplainProgram, FindsNothingWhereNothingIs) {
   const json e = explained();
   EXPECT_EQ(e["verdict"], "no_structure");
   EXPECT_EQ(e["after"], e["before"]);
+}
+
+TEST_F(ExplainProgram, ARunWithARotorThatPushesIsLeftOutAndSaid) {
+  write_campaign(10, "", [](SimulatedRun& run) {
+    sag(run);
+    if (run.number == 40) run.first_rotor_factor = -1;
+  });
+  import_campaign();
+  const json e = explained();
+  EXPECT_EQ(e["runs"], 89);
+  EXPECT_THAT(warnings, HasSubstr("R041: thrust is -7."));
+  EXPECT_EQ(e["verdict"], "explained");
 }
 
 TEST_F(ExplainProgram, AFewSessionsAreInsufficient) {

@@ -245,6 +245,20 @@ TEST_F(ExplainTest, EffectsThatGoTogetherAreConfounded) {
   expect_contract(e);
 }
 
+/// One that would need an exponent of 25 for the same is no rival.
+TEST_F(ExplainTest, RivalsStayWithinTheirBounds) {
+  Observations o = observations(16);
+  Covariate excitation = *o.find("supply_voltage_V");
+  excitation.name = "excitation_voltage_V";
+  excitation.value = 5 + 5.0 / 16 * (excitation.value.array() - 16) / 50;
+  o.covariates.push_back(excitation);
+  test::add_effect(o, "supply_voltage", {0.5});
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.adopted.size(), 1u);
+  EXPECT_EQ(e.adopted[0].term.effect->name, "supply_voltage");
+  EXPECT_THAT(e.adopted[0].confounded_with, testing::Not(Contains("excitation_voltage")));
+}
+
 TEST_F(ExplainTest, AGrossRowIsSuspectAndNamesNothing) {
   Observations o = observations(16);
   Eigen::MatrixXd y = o.y;

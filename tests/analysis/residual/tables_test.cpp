@@ -1,4 +1,5 @@
 // Tables as others bring them: gross rows, a cell's volts, groups that differ, steps and trends.
+#include "analysis/residual/curves.h"
 #include "analysis/residual/explanation_output.h"
 #include "analysis/residual/explanation_parts.h"
 #include "analysis/residual/simulated.h"
@@ -144,6 +145,37 @@ TEST_F(TablesTest, GroupsWithExponentsOfTheirOwnAreTold) {
   EXPECT_EQ(
       nlohmann::json::parse(explanation_json(e))["adopted"][0]["parameters"]["exponent"]["groups"].size(),
       2u);
+}
+
+/// A cell that is pulled reads below zero; what its zero does is added all the same.
+TEST_F(TablesTest, EffectsAreAddedToNegativeResponsesWithTheirSign) {
+  std::string csv = "g,b,T,u\n";
+  for (int r = 0; r < 96; ++r) {
+    const double temperature = 40 * even(random), load = r % 2 == 0 ? -4 : -8;
+    csv += fmt::format("{},{},{},{}\n", r % 2, r / 8, temperature,
+                       load * (1 + 0.002 * scatter(random)) + 0.01 * (temperature - 20));
+  }
+  const Explanation e = explained(
+      observed(csv,
+               "groups = [\"g\"]\nblocks = \"b\"\n[response]\ncolumn = \"u\"\nunit = \"N\"\n"
+               "[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\nmeaning = \"cell_temperature_C\"\n"));
+  ASSERT_EQ(names(e), "zero_drift_temperature ");
+  EXPECT_NEAR(e.adopted[0].parameters[0].value, 0.01, 0.001);
+}
+
+/// Between two supplies nothing was measured: no wave is laid there.
+TEST_F(TablesTest, CurvesDoNotSwingInAGap) {
+  std::string csv = "b,V,y\n";
+  for (int r = 0; r < 96; ++r)
+    csv += fmt::format("{},{},{}\n", r / 8, (r % 2 == 0 ? 7.5 : 11.5) + 0.4 * even(random),
+                       5 * (1 + 0.003 * scatter(random)));
+  const Observations o = observed(csv,
+                                  "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+                                  "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\n");
+  std::size_t most = 0;
+  for (const Curve& curve : curves_to_try(o, all_rows(o)))
+    if (curve.covariate == "V") most = std::max(most, curve.columns.size());
+  EXPECT_EQ(most, 2u);
 }
 
 /// Runs of four rotors in 16 sessions, with their order as a condition.
