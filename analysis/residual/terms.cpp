@@ -235,6 +235,9 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason = "the measured speed is part of the response";
   if (observations.coefficient && (effect.name == "nonlinearity" || effect.name == "bidirectional"))
     result.reason = "a coefficient is no force that a cell has read";
+  if (observations.baseline.starts_with("linear:") &&
+      (effect.name == "nonlinearity" || effect.name == "bidirectional"))
+    result.reason = "a curve over the baseline's column says where it is not straight";
   if (effect.needs_previous && std::all_of(observations.previous.begin(), observations.previous.end(),
                                            [](int before) { return before < 0; }))
     result.reason = "the rows have no order, which a condition run_order would give them";
