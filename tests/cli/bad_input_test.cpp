@@ -145,7 +145,6 @@ TEST_F(BadInput, ASchemaThatTheTableDoesNotBear) {
   };
   EXPECT_THAT(refused("groups", "group"), HasSubstr("s.toml:2: the file: group is no key here"));
   EXPECT_THAT(refused("\"%\"", "\"1\""), HasSubstr("t.csv:2: column h: 41 is no relative humidity"));
-  EXPECT_THAT(refused("\"g\"]", "\"g\", \"h\"]"), HasSubstr("s.toml:2: groups = [\"g\", \"h\"]"));
   EXPECT_THAT(refused("groups", "hold_out = \"h >\"\ngroups"), HasSubstr("s.toml:2: hold_out: h > is no"));
   write_text(folder / "s.toml", schema);
   const ProgramResult imported = test::run_program(folder.path(), verb);

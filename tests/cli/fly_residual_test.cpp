@@ -52,8 +52,8 @@ TEST_F(FlightResidual, APayloadIsFoundAndNoRotorIsToBlame) {
   const json vertical = explained("vertical");
   ASSERT_EQ(vertical["adopted"].size(), 1U);
   EXPECT_EQ(vertical["adopted"][0]["effect"], "payload");
-  // 0.15 of 2.45 kg; all residuals are negative, so that their size counts and the sign turns.
-  EXPECT_NEAR(value(vertical["adopted"][0], "share"), -0.15 / 2.45, 0.015);
+  // All residuals are negative, so that their size counts; the parameter keeps its own sign.
+  EXPECT_NEAR(value(vertical["adopted"][0], "share"), 0.15 / 2.45, 0.015);
   EXPECT_LT(shrunk_to(vertical), 0.9);
   EXPECT_EQ(explained("pitch")["verdict"], "no_structure");
 }
