@@ -38,6 +38,7 @@ int import_folder(const ImportVerbOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const ImportSummary summary = import_campaign_folder(options.source, options.db, how);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  for (const std::string& doubt : summary.doubts) warn(doubt);
   if (options.json) {
     fmt::print("{}\n", nlohmann::json{{"db", options.db},
                                       {"runs", summary.runs},

@@ -1,6 +1,7 @@
 #include "datasets/campaign_folder.h"
 
 #include "datasets/error.h"
+#include "datasets/import_doubts.h"
 #include "datasets/npy.h"
 #include "datasets/staged_output.h"
 #include "datasets/statistics_store.h"
@@ -287,7 +288,8 @@ ImportSummary import_campaign_folder(const fs::path& folder, const fs::path& fil
   campaign.set_sheet("calibration", text.calibration);
   if (text.propellers) campaign.set_sheet("propellers", *text.propellers);
   campaign.set_sheet("runs", text.runs);
-  ImportSummary summary{.runs = text.parsed_runs.size()};
+  ImportSummary summary{.runs = text.parsed_runs.size(),
+                        .doubts = import_doubts(text.info, text.runs, text.parsed_runs)};
   std::size_t done = 0;
   RawImport raw(campaign, folder, text.info, options, summary);
   for (const Run& run : text.parsed_runs) {

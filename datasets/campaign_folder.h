@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace tunnelrig {
 
@@ -26,6 +27,7 @@ struct ImportSummary {
   std::size_t raw_runs = 0;
   std::uint64_t frames = 0;
   std::uint64_t raw_bytes = 0;
+  std::vector<std::string> doubts;  // import_doubts.h
 };
 
 /// Reads a campaign folder into a new campaign file. Throws InputError naming file, line and column at the

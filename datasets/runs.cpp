@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -82,11 +83,27 @@ void check_units(const Sheet& sheet) {
   }
 }
 
-bool all_numbers(const Sheet& sheet, std::size_t column) {
-  return std::all_of(sheet.rows.begin(), sheet.rows.end(), [&](const Sheet::Row& row) {
+/// How spreadsheets and programs write that there is no number.
+bool stands_for_no_number(std::string cell) {
+  static const std::set<std::string_view> kNone = {"nan", "na", "n/a", "#n/a", "null", "inf", "-inf"};
+  std::transform(cell.begin(), cell.end(), cell.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return kNone.contains(cell);
+}
+
+/// Numbers among what may be no number; labels else.
+bool has_numbers(const Sheet& sheet, std::size_t column) {
+  std::size_t numbers = 0, filled = 0;
+  for (const Sheet::Row& row : sheet.rows) {
     const std::string& cell = row.cells[column];
-    return cell.find_first_not_of(" \t") == std::string::npos || parse_number(cell).has_value();
-  });
+    if (cell.find_first_not_of(" \t") == std::string::npos) continue;
+    ++filled;
+    if (parse_number(cell))
+      ++numbers;
+    else if (!stands_for_no_number(cell))
+      return false;
+  }
+  return numbers > 0 || filled == 0;
 }
 
 void check_range(const Sheet& sheet, std::size_t row, std::string_view column, double value) {
@@ -125,7 +142,7 @@ Columns sort_columns(const Sheet& sheet) {
     const std::string& name = sheet.columns[i];
     if (name.empty() || is_text_column(name)) continue;
     const bool known = known_column(name) != nullptr || name == "thrust_4_N";
-    (known || all_numbers(sheet, i) ? columns.numbers : columns.labels).push_back(i);
+    (known || has_numbers(sheet, i) ? columns.numbers : columns.labels).push_back(i);
   }
   return columns;
 }
@@ -303,7 +320,9 @@ std::optional<double> parse_utc(std::string_view text) {
   calendar.tm_mday = day;
   calendar.tm_hour = hour;
   calendar.tm_min = minute;
-  return static_cast<double>(::timegm(&calendar)) + second - 60.0 * zone_minutes;
+  const std::time_t seconds = ::timegm(&calendar);  // counts on: the 30th of February is the 2nd of March
+  if (hour < 24 && (calendar.tm_mon != month - 1 || calendar.tm_mday != day)) return {};
+  return static_cast<double>(seconds) + second - 60.0 * zone_minutes;
 }
 
 std::string format_utc(double seconds) {

@@ -46,6 +46,22 @@ TEST(Runs, UnknownColumnsAreCovariatesOrLabels) {
   EXPECT_EQ(runs[1].labels.count("operator"), 0u);
 }
 
+TEST(Runs, NoNumberAmongNumbersIsRefused) {
+  const std::string head =
+      "run,location,repeat,session,start_utc,raw,fan_rpm\nR1,OT,1,S1,2026-03-02T08:00Z,r.npy,1200\n";
+  for (const char* none : {"nan", "NaN", "NA", "#N/A", "inf", "null"})
+    EXPECT_THAT(
+        refusal(head + "R2,OT,2,S1,2026-03-02T08:10Z,r2.npy," + none + "\n"),
+        HasSubstr(std::string("runs.csv:3: column fan_rpm: '") + none + "' is not a finite decimal number"));
+}
+
+TEST(Runs, DaysAreThoseOfTheCalendar) {
+  EXPECT_FALSE(parse_utc("2026-02-30T08:00:00Z").has_value());
+  EXPECT_FALSE(parse_utc("2026-02-29T08:00:00Z").has_value());
+  EXPECT_TRUE(parse_utc("2028-02-29T08:00:00Z").has_value());
+  EXPECT_EQ(parse_utc("2026-12-31T24:00:00Z"), parse_utc("2027-01-01T00:00:00Z"));
+}
+
 TEST(Runs, GridLabelsGiveTheirCoordinatesWhereNoneAreWritten) {
   const auto runs = parse(
       "run,location,repeat,session,start_utc,raw\nR1,H3V2,1,S1,2026-03-02T08:00Z,r.npy\n"

@@ -1,0 +1,116 @@
+#include "datasets/import_doubts.h"
+
+#include "datasets/locations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+
+namespace tunnelrig {
+namespace {
+
+using Doubts = std::vector<std::string>;
+
+/// What campaign_toml.cpp reads.
+const std::map<std::string_view, std::vector<std::string_view>>& known_keys() {
+  static const std::map<std::string_view, std::vector<std::string_view>> keys = {
+      {"rig",
+       {"rotors", "propeller_radius_m", "rotor_area_m2", "nominal_speed_rpm", "arm_length_m",
+        "vehicle_width_m", "vehicle_height_m", "blades", "cell_limit_N", "blade_chord_m"}},
+      {"tunnel", {"width_m", "height_m"}},
+      {"daq", {"sample_rate_hz", "adc_bits", "adc_reference_V", "mains_hz"}},
+      {"uncertainty", {"speed_rpm", "air_temperature_K", "air_pressure_Pa", "force_N"}}};
+  return keys;
+}
+
+void doubt_keys(const std::string& text, Doubts& doubts) {
+  const toml::table document = toml::parse(text);
+  for (const auto& [name, node] : document) {
+    const toml::table* table = node.as_table();
+    if (table == nullptr) continue;  // free text about the campaign is welcome
+    const auto known = known_keys().find(name.str());
+    if (known == known_keys().end()) {
+      doubts.push_back(
+          fmt::format("campaign.toml:{}: nothing reads [{}]", name.source().begin.line, name.str()));
+      continue;
+    }
+    const auto& keys = known->second;
+    for (const auto& [key, value] : *table)
+      if (std::find(keys.begin(), keys.end(), key.str()) == keys.end())
+        doubts.push_back(fmt::format("campaign.toml:{}: nothing reads {}.{}; known are {}",
+                                     key.source().begin.line, name.str(), key.str(), fmt::join(keys, ", ")));
+  }
+}
+
+/// A column that is a label because of a few cells.
+void doubt_labels(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doubts) {
+  constexpr std::size_t kNumbersPerText = 4;
+  std::map<std::string, std::size_t> texts, numbers, first;
+  for (const Run& run : runs)
+    for (const auto& [column, cell] : run.labels) {
+      const bool number = parse_number(cell).has_value();
+      ++(number ? numbers : texts)[column];
+      if (!number) first.emplace(column, run.row);
+    }
+  for (const auto& [column, count] : texts)
+    if (numbers[column] >= kNumbersPerText * count)
+      doubts.push_back(fmt::format(
+          "{}: '{}' is no number, as {} other cells are: the column is kept as text and is no condition of "
+          "the runs",
+          sheet.where(first.at(column), column), sheet.text(first.at(column), column), numbers[column]));
+}
+
+/// Thrusts in grams, or of another rotor.
+void doubt_thrusts(const CampaignInfo& info, const Sheet& sheet, const std::vector<Run>& runs,
+                   Doubts& doubts) {
+  constexpr double kSeaLevel_kg_m3 = 1.2;
+  constexpr double kMostCoefficient = 0.3;  // T/(½ρΩ²R²A): the most loaded rotors stay below 0.1
+  for (const Run& run : runs) {
+    const double speed_rad_s =
+        run.number("speed_rpm").value_or(info.rig.nominal_speed_rpm) * std::numbers::pi / 30;
+    const double tip_m_s = speed_rad_s * info.rig.propeller_radius_m;
+    const double largest_N =
+        kMostCoefficient * 0.5 * kSeaLevel_kg_m3 * tip_m_s * tip_m_s * info.rig.rotor_area_m2;
+    for (int rotor = 0; rotor < info.rig.rotors; ++rotor) {
+      const auto thrust_N = run.thrust_N[static_cast<std::size_t>(rotor)];
+      if (!thrust_N || !(largest_N > 0) || std::abs(*thrust_N) <= largest_N) continue;
+      doubts.push_back(
+          fmt::format("{}: {:g} N is more than a rotor of {:g} m radius gives at this speed "
+                      "({:.3g} N at most): are these newtons?",
+                      sheet.where(run.row, fmt::format("thrust_{}_N", rotor + 1)), *thrust_N,
+                      info.rig.propeller_radius_m, largest_N));
+      return;  // one says it for all
+    }
+  }
+}
+
+void doubt_places(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doubts) {
+  std::map<std::string, const Run*> first;
+  for (const Run& run : runs) {
+    if (run.kind != RunKind::kThrust) continue;
+    const auto [found, fresh] = first.emplace(canonical_location(run.location), &run);
+    if (found->second->y_norm == run.y_norm && found->second->z_norm == run.z_norm) continue;
+    doubts.push_back(fmt::format("{}:{}: location {} stands elsewhere than in run {}: it cannot be reduced",
+                                 sheet.file, run.line, run.location, found->second->run));
+    return;
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& runs_sheet,
+                                       const std::vector<Run>& runs) {
+  Doubts doubts;
+  doubt_keys(info.toml, doubts);
+  doubt_labels(runs_sheet, runs, doubts);
+  doubt_thrusts(info, runs_sheet, runs, doubts);
+  doubt_places(runs_sheet, runs, doubts);
+  return doubts;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,68 @@
+#include "datasets/import_doubts.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr const char* kToml =
+    "format = \"tunnelrig-campaign/1\"\nlaboratory = \"ours\"\n[rig]\npropeller_radius_m = 0.15\n"
+    "nominal_speed_rpm = 5000\n[tunnel]\nwidth_m = 1.5\nheight_m = 1.5\n";
+
+std::vector<std::string> doubts(const std::string& toml, const std::string& csv) {
+  const CampaignInfo info = parse_campaign_toml(toml, "campaign.toml");
+  const Sheet sheet = parse_csv(csv, "runs.csv");
+  return import_doubts(info, sheet, parse_runs(sheet, info));
+}
+
+/// Six runs at one place; `cells` are appended to their lines.
+std::string runs(const std::string& column, const std::vector<std::string>& cells,
+                 const std::string& thrusts = "7,7,7,7") {
+  std::string csv = "run,location,repeat,session,start_utc,raw,thrust_1_N,thrust_2_N,thrust_3_N,thrust_4_N," +
+                    column + "\n";
+  for (std::size_t r = 0; r < cells.size(); ++r)
+    csv += fmt::format("R{},H1V1,{},S1,2026-03-02T08:0{}:00Z,,{},{}\n", r, r + 1, r, thrusts, cells[r]);
+  return csv;
+}
+
+const std::vector<std::string> kNumbers = {"1", "2", "", "3", "4", "5"};
+
+TEST(ImportDoubts, NothingIsSaidOfASoundCampaign) {
+  EXPECT_THAT(doubts(kToml, runs("fan_rpm", kNumbers)), IsEmpty());
+}
+
+TEST(ImportDoubts, KeysThatNothingReads) {
+  EXPECT_THAT(doubts(std::string(kToml) + "[uncertanty]\nforce_N = 0.1\n", runs("fan_rpm", kNumbers)),
+              ElementsAre("campaign.toml:9: nothing reads [uncertanty]"));
+  EXPECT_THAT(doubts(std::string(kToml) + "lenght_m = 20\n", runs("fan_rpm", kNumbers)),
+              ElementsAre(HasSubstr("campaign.toml:9: nothing reads tunnel.lenght_m; known are width_m")));
+}
+
+TEST(ImportDoubts, ATextAmongNumbersMakesALabel) {
+  EXPECT_THAT(doubts(kToml, runs("fan_rpm", {"1", "2", "\"3,5\"", "3", "4", "5"})),
+              ElementsAre(HasSubstr("runs.csv:4: column fan_rpm: '3,5' is no number, as 5 other cells are")));
+  EXPECT_THAT(doubts(kToml, runs("propeller", {"1", "2", "spare", "3", "4", "spare"})), IsEmpty())
+      << "many texts are labels";
+}
+
+TEST(ImportDoubts, GramsAreNoNewtons) {
+  EXPECT_THAT(
+      doubts(kToml, runs("fan_rpm", kNumbers, "700,7,7,7")),
+      ElementsAre(HasSubstr("runs.csv:2: column thrust_1_N: 700 N is more than a rotor of 0.15 m radius")));
+}
+
+TEST(ImportDoubts, ALocationStandsAtOnePlace) {
+  const std::string head =
+      "run,location,repeat,session,start_utc,raw,thrust_1_N,thrust_2_N,thrust_3_N,thrust_4_N,";
+  EXPECT_THAT(doubts(kToml, head + "y_norm,z_norm\nA,here,1,S,2026-03-02T08:00:00Z,,7,7,7,7,0.1,0\n"
+                                   "B,here,2,S,2026-03-02T08:10:00Z,,7,7,7,7,0.2,0\n"),
+              ElementsAre("runs.csv:3: location here stands elsewhere than in run A: it cannot be reduced"));
+}
+
+}  // namespace
+}  // namespace tunnelrig
