@@ -261,9 +261,15 @@ void add_instruments(const CampaignData& data, const Grouping& grouping, const R
     left_out("pressure", "air_pressure_Pa");
 }
 
-void note_components(const VarianceComponents& components, std::vector<std::string>& notes) {
+void note_components(const VarianceComponents& components, const Reduction& reduction,
+                     std::vector<std::string>& notes) {
   if (!components.run_known && !components.visit_known) {
-    notes.emplace_back("repeatability: no location was repeated; the noise within runs stands in for it");
+    const bool noise = std::any_of(reduction.runs.begin(), reduction.runs.end(),
+                                   [](const RunCoefficients& run) { return run.c_t_standard_error > 0; });
+    notes.emplace_back(noise
+                           ? "repeatability: no location was repeated; the noise within runs stands in for it"
+                           : "repeatability: no location was repeated and there are no raw data, so how far "
+                             "C_T and U scatter is not known");
   }
   if (!components.session_known) {
     notes.emplace_back("sessions: no location was measured in two sessions, so their scatter is left out");
@@ -278,6 +284,7 @@ LocationValue combine(const LocationMeans& means, std::size_t l, double noise_va
   double variance = means.covariance(row, row);
   double over_dof = variance > 0 && std::isfinite(means.dof[l]) ? variance * variance / means.dof[l] : 0;
   if (variance <= 0) variance = noise_variance;
+  const bool known = variance > 0;  // without repeats and raw data instruments alone would look exact
   for (const SharedSource& source : sources) {
     const Eigen::RowVectorXd slope = (source.*slopes).row(row);
     const double part = slope * source.covariance * slope.transpose();
@@ -288,6 +295,7 @@ LocationValue combine(const LocationMeans& means, std::size_t l, double noise_va
   value.dof = over_dof > 0 ? variance * variance / over_dof
                            : std::numeric_limits<double>::infinity();  // Welch–Satterthwaite
   value.u95 = student_t_quantile(0.975, value.dof) * value.standard_uncertainty;
+  if (!known) value.standard_uncertainty = value.u95 = std::numeric_limits<double>::quiet_NaN();
   return value;
 }
 
@@ -297,7 +305,8 @@ Budget budget_of(const LocationMeans& means, const VarianceComponents& component
   // Without repeats within a visit, coming back and repeating are one.
   budget.run = std::sqrt(components.run_known     ? means.run_part[l]
                          : components.visit_known ? means.visit_part[l]
-                                                  : noise_variance);
+                         : noise_variance > 0     ? noise_variance
+                                                  : std::numeric_limits<double>::quiet_NaN());
   budget.visit = components.run_known ? std::sqrt(means.visit_part[l]) : 0;
   budget.session = std::sqrt(means.session_part[l]);
   for (const SharedSource& source : sources) {
@@ -321,7 +330,7 @@ Summary summarize_locations(const CampaignData& data, const Reduction& reduction
   const Scatter c_t_scatter = scatter_of(grouping, c_t, true);
   const bool has_u = data.info.rig.rotors == kMaxRotors;
   const Scatter u_scatter = has_u ? scatter_of(grouping, u, false) : Scatter{};
-  note_components(c_t_scatter.components, summary.notes);
+  note_components(c_t_scatter.components, reduction, summary.notes);
 
   std::vector<SharedSource> sources;
   add_calibration(data, grouping, reduction, sources);

@@ -15,10 +15,10 @@ namespace tunnelrig {
 /// One quantity (C_T, U) at one location.
 struct LocationValue {
   double mean = 0;
-  double std = 0;  // over the runs; NaN for a single one
-  double standard_uncertainty = 0;
-  double dof = 0;  // effective, Welch–Satterthwaite
-  double u95 = 0;  // expanded: Student's t at 95 %
+  double std = 0;                   // over the runs; NaN for a single one
+  double standard_uncertainty = 0;  // NaN, and u95 as well, where nothing tells how runs scatter
+  double dof = 0;                   // effective, Welch–Satterthwaite
+  double u95 = 0;                   // expanded: Student's t at 95 %
 };
 
 /// Standard uncertainties of C_T at a location by source, absolute.

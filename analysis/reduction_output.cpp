@@ -43,9 +43,9 @@ std::string csv_model(const Reduction& reduction) {
 Json value_json(const LocationValue& value, double factor) {
   return {{"mean", factor * value.mean},
           {"std", maybe(factor * value.std)},
-          {"standard_uncertainty", factor * value.standard_uncertainty},
+          {"standard_uncertainty", maybe(factor * value.standard_uncertainty)},
           {"dof", maybe(value.dof)},
-          {"u95", factor * value.u95}};
+          {"u95", maybe(factor * value.u95)}};
 }
 
 Json location_json(const LocationSummary& location, double factor, bool has_u) {

@@ -136,6 +136,23 @@ TEST(Locations, CovarianceIsSymmetricAndHoldsTheVariances) {
   }
 }
 
+/// One run at each location, from means without raw data: no repeat and no noise says how far C_T scatters.
+TEST(Locations, WithoutRepeatsOrRawDataTheUncertaintyIsNotKnown) {
+  const CampaignData data = given_thrusts(
+      "R1,OT,1,S1,2026-03-02T08:00Z,,7,7.1,7,7,20,,,\nR2,OS,1,S1,2026-03-02T08:00Z,,7,7,7,7,20,,,\n");
+  const Reduction reduction = reduce_runs(data, {});
+  const Summary summary = summarize_locations(data, reduction);
+  for (const LocationSummary& location : summary.locations) {
+    EXPECT_TRUE(std::isnan(location.c_t.u95));
+    EXPECT_TRUE(std::isnan(location.u_percent.u95));
+  }
+  EXPECT_THAT(testing::PrintToString(summary.notes), HasSubstr("how far C_T and U scatter is not known"));
+  const Sheet sheet =
+      parse_csv(locations_csv(summary, reduction, data.info.rig, Convention::kThesis), "out.csv");
+  for (const char* column : {"c_t_u95", "u_percent_u95", "c_t_u_run"})
+    EXPECT_EQ(sheet.text(0, column), "") << column;
+}
+
 TEST(ReductionOutput, CsvColumnsAreInTheirOrderAndEmptyMeansNotKnown) {
   const CampaignData data = given_thrusts(
       "R1,OT,1,S1,2026-03-02T08:00Z,,7,7,7,7,20,,,\nR2,OS,1,S2,2026-03-02T08:00Z,,7,7,7,7,20,,,\n");
