@@ -107,7 +107,7 @@ int run_explain(ExplainOptions options) {
         "a model corrects the thrusts of a campaign: the curve is in the errors above, and nothing is "
         "stored");
   else if (options.adopt || options.adopt_empirical)
-    adopt_and_store(options, observations, explanation);
+    adopt_and_store(options, without_set_aside(observations, explanation), explanation);
   return kWell;
 }
 

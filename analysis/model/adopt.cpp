@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace tunnelrig {
 namespace {
@@ -26,11 +25,7 @@ ModelTerm model_term(const AdoptedEffect& adopted, const Observations& observati
   for (std::size_t k = 0; k < adopted.parameters.size(); ++k) {
     term.parameters.push_back(adopted.parameters[k].value);
     term.units.push_back(adopted.parameters[k].unit);
-    if (term.effect->parameters[k].role == ParameterRole::kChangePoint) {
-      const double row =
-          std::clamp(adopted.parameters[k].value, 0.0, static_cast<double>(observations.rows() - 1));
-      term.first_run = observations.name[static_cast<std::size_t>(std::ceil(row))];
-    }
+    if (!adopted.parameters[k].run.empty()) term.first_run = adopted.parameters[k].run;
   }
   return term;
 }
@@ -70,8 +65,7 @@ bool has_column(const ModelTerm& term, std::size_t k) {
 
 /// The joint fit at the explanation's model: amplitudes of its curves, and covariance of all its columns.
 AmplitudeFit joint_fit_of(const Observations& observations, const Explanation& explanation) {
-  std::vector<int> rows(static_cast<std::size_t>(observations.rows()));
-  std::iota(rows.begin(), rows.end(), 0);
+  const std::vector<int> rows = observations.all_rows();
   const JointFit fit = fit_jointly(observations, explanation.model, rows);
   const Components y = difference(response_components(observations), fit.linear.offset);
   return fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <optional>
 
 namespace tunnelrig {
@@ -133,9 +132,7 @@ class Forward {
                             .at_theory = term.at_theory,
                             .parameters = term.parameters});
     }
-    std::vector<int> rows(static_cast<std::size_t>(observations_.rows()));
-    std::iota(rows.begin(), rows.end(), 0);
-    if (needed) predicted_ = predict_response(observations_, mean, rows);
+    if (needed) predicted_ = predict_response(observations_, mean, observations_.all_rows());
   }
 
   bool applies(std::size_t t, Index row, Index channel) const {

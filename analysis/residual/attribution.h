@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -60,7 +61,8 @@ struct Attribution {
   JointFit baseline, final;   // without and with the accepted terms and curves
   Observations observations;  // what `final` speaks of: with a group's own amplitudes among its baseline
   std::vector<Round> rounds, curve_rounds;
-  double detectable_sigma = 0;  // rms of an effect, in y, that is found at 80 % power
+  double detectable_sigma = 0;  // rms, in y, from which any of the effects is found at 80 % power
+  std::map<std::string, double> detectable_by_effect;  // likewise, of each
 };
 
 /// Candidates that can be tried, each in all its ways.

@@ -62,17 +62,13 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
 }
 
 void warn_of_constant(const Observations& observations, Explanation& explanation) {
-  std::set<std::string> constant;
-  for (const Untestable& entry : explanation.untestable)
-    for (const Effect& effect : all_effects())
-      for (const std::string& name : effect.covariates) {
-        const Covariate* covariate = observations.find(name);
-        if (entry.effect == effect.name && entry.missing.empty() && covariate != nullptr &&
-            !covariate->derived && covariate->value.maxCoeff() == covariate->value.minCoeff())
-          constant.insert(name);
-      }
-  for (const std::string& name : constant)
-    explanation.warnings.push_back(name + " is the same in every run: nothing can be found that follows it");
+  for (const Covariate& covariate : observations.covariates)
+    if (!covariate.derived && !observations.not_usable.contains(covariate.name) &&
+        !observations.assumed.contains(covariate.name) &&
+        covariate.value.maxCoeff() == covariate.value.minCoeff())
+      explanation.warnings.push_back(
+          fmt::format("{} is the same in every {}: nothing can be found that follows it", covariate.name,
+                      observations.from_table ? "row" : "run"));
 }
 
 void warn_of_collinear(const Observations& observations, Explanation& explanation) {
@@ -124,6 +120,29 @@ void warn_of_run_correlation(const Observations& observations, Explanation& expl
                     observations.channels() > 1 ? "runs" : "rows", correlation,
                     observations.channels() > 1 ? " of " : "", observations.channels() > 1 ? kOf[s] : ""));
   }
+}
+
+void warn_of_alike_rows(const Observations& observations, Explanation& explanation) {
+  constexpr double kFarFromIndependent = 3;  // standard deviations of 1/√n
+  if (!observations.blocks_are_rows) return;
+  VectorXd residual = explanation.residual_after.col(0);
+  if (observations.multiplicative) residual = residual.array() / observations.value.col(0).array();
+  double products = 0, pairs = 0;
+  for (Index r = 1; r < residual.size(); ++r) {
+    const auto row = static_cast<std::size_t>(r);
+    if (observations.group[row] != observations.group[row - 1]) continue;
+    products += residual(r) * residual(r - 1);
+    ++pairs;
+  }
+  const double variance = residual.squaredNorm() / static_cast<double>(residual.size());
+  if (pairs == 0 || !(variance > 0)) return;
+  const double correlation = products / pairs / variance;
+  if (correlation * std::sqrt(pairs) < kFarFromIndependent) return;
+  explanation.warnings.push_back(fmt::format(
+      "rows resemble the row before them (correlation {:.2f}) and are taken as independent: names and "
+      "p may be wrong; rows that belong together want a block of their own (blocks = a column, or "
+      "bins(column, n))",
+      correlation));
 }
 
 }  // namespace tunnelrig

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -15,6 +14,7 @@ using Eigen::MatrixXd;
 
 constexpr int kFewestBlocks = 6;
 constexpr std::size_t kRowsPerGross = 10;  // at most one row of ten is set aside
+constexpr std::size_t kRunsPerGross = 50;  // what touches more runs of a campaign is no slip of the hand
 constexpr int kMostSearches = 2;           // after the first, each without the gross rows of the one before
 
 /// Errors of the fitted runs themselves, n × c in the unit.
@@ -64,7 +64,7 @@ std::string verdict_of(const Explanation& explanation) {
 /// Too few blocks to find out anything: errors of the baseline, by leaving blocks out where there are two.
 void explain_too_few(const Observations& observations, const SearchSettings& settings,
                      Explanation& explanation) {
-  const std::vector<int> rows = all_rows(observations);
+  const std::vector<int> rows = observations.all_rows();
   const JointFit fit = fit_jointly(observations, {}, rows);
   explanation.residual_before = explanation.residual_after = residuals(observations, fit, rows);
   explanation.before.rmse = rms(explanation.residual_before);
@@ -119,7 +119,7 @@ struct ChangePoint {
 MeanModel with_change_points_of_all(const Observations& observations, MeanModel model,
                                     const std::vector<int>& open, std::vector<ChangePoint>& result) {
   constexpr double kHalfChiSquared = 1.92;  // 95 % of one degree of freedom, halved
-  const std::vector<int> rows = all_rows(observations);
+  const std::vector<int> rows = observations.all_rows();
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const auto& parameters = model.terms[t].effect->parameters;
     for (std::size_t k = 0; k < parameters.size(); ++k) {
@@ -173,9 +173,8 @@ void warn_of_doubts(Explanation& explanation) {
 
 std::string only_sealed_in_words(const std::vector<std::string>& groups) {
   constexpr std::size_t kNamed = 5;
-  const std::vector<std::string> named(
-      groups.begin(), groups.begin() + static_cast<std::ptrdiff_t>(std::min(groups.size(), kNamed)));
-  return fmt::format("runs in sealed blocks only, so not scored: {}{}", fmt::join(named, ", "),
+  const auto end = groups.begin() + static_cast<std::ptrdiff_t>(std::min(groups.size(), kNamed));
+  return fmt::format("runs in sealed blocks only, so not scored: {}{}", fmt::join(groups.begin(), end, ", "),
                      groups.size() > kNamed ? fmt::format(" and {} more", groups.size() - kNamed) : "");
 }
 
@@ -193,7 +192,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   explanation.warnings = observations.left_out;
   for (const auto& [covariate, why] : observations.not_usable)
     explanation.warnings.push_back(fmt::format("{} is {}", covariate, why));
-  const std::vector<int> rows = all_rows(observations);
+  const std::vector<int> rows = observations.all_rows();
   if (observations.blocks() < kFewestBlocks) {
     report_untestable(observations, effects, rows, explanation);
     explain_too_few(observations, settings, explanation);
@@ -212,6 +211,8 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
   explanation.detectable = found.detectable_sigma * scale_of(observations);
+  for (const auto& [name, sigma] : found.detectable_by_effect)
+    explanation.detectable_by_effect[name] = sigma * scale_of(observations);
 
   // The seal is opened: nothing that was decided above changes any more. Curves have no name, so they are not
   // part of "after" unless they are asked for.
@@ -248,6 +249,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
     ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
     estimate.low = point.low;
     estimate.high = point.high;
+    estimate.run = observations.name[static_cast<std::size_t>(estimate.value)];
   }
   warn_of_doubts(explanation);
   for (const FoundCurve& curve : found.curves)
@@ -256,6 +258,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
     explanation.unknown.push_back(describe_sessions(observations, fitted.error, rows));
   explanation.suspect_rows =
       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
+  warn_of_alike_rows(observations, explanation);
   explanation.verdict = verdict_of(explanation);
   return explanation;
 }
@@ -270,13 +273,14 @@ std::vector<int> rows_but(const Observations& observations, const std::vector<Su
   return rows;
 }
 
-/// What is left of a table, and what is not.
+/// What is left of the rows, and what is not.
 struct SetAside {
   Observations kept;
   std::size_t most;
   std::vector<SuspectRow> rows;
 
-  explicit SetAside(const Observations& all) : kept(all), most(all.name.size() / kRowsPerGross) {}
+  explicit SetAside(const Observations& all)
+      : kept(all), most(all.name.size() / (all.from_table ? kRowsPerGross : kRunsPerGross)) {}
   std::size_t room() const { return most - std::min(most, rows.size()); }
   void take(const std::vector<SuspectRow>& gross) {
     kept = kept.subset(rows_but(kept, gross));
@@ -322,12 +326,6 @@ struct OtherAxis {
 
 }  // namespace
 
-std::vector<int> all_rows(const Observations& observations) {
-  std::vector<int> rows(static_cast<std::size_t>(observations.rows()));
-  std::iota(rows.begin(), rows.end(), 0);
-  return rows;
-}
-
 Observations without_set_aside(const Observations& observations, const Explanation& explanation) {
   std::vector<SuspectRow> aside;
   for (const SuspectRow& row : explanation.suspect_rows)
@@ -357,15 +355,15 @@ std::vector<Effect> effects_of_other_axes(const Observations& observations) {
 
 Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
                     const SearchSettings& settings) {
-  // A gross error hides what else is there: of a table's rows it is set aside, and said.
+  // A gross error hides what else is there: it is set aside, and said.
   SetAside aside(observations);
   while (const auto row = gross_row(aside.kept)) {
     if (aside.room() == 0) break;
     aside.take({*row});
   }
   Explanation explanation = explain_all(aside.kept, effects, settings);
-  for (int again = 0; again < kMostSearches && observations.from_table; ++again) {
-    const std::vector<SuspectRow> gross = gross_rows(explanation.suspect_rows);
+  for (int again = 0; again < kMostSearches; ++again) {
+    const std::vector<SuspectRow> gross = gross_rows(aside.kept, explanation.suspect_rows);
     if (gross.empty() || gross.size() > aside.room()) break;  // many are no typing errors: the model is wrong
     aside.take(gross);
     explanation = explain_all(aside.kept, effects, settings);

@@ -23,6 +23,7 @@ struct ParameterEstimate {
   double value = 0, low = 0, high = 0;  // 95 %
   bool theory = false;                  // the value is known physics; the interval is what the data say
   std::vector<GroupEstimate> groups;    // where each group has its own; value is their median then
+  std::string run;                      // of a change-point: the first run (row) behind it
 };
 
 /// The run that would tell confounded effects apart.
@@ -78,7 +79,8 @@ struct Explanation {
   std::vector<SuspectRow> suspect_rows;
   std::vector<std::string> warnings;
   std::vector<std::string> empirical;  // curves that `after` has in it, because they were asked for
-  double detectable = 0;
+  double detectable = 0;               // at 80 % power, whichever effect it is
+  std::map<std::string, double> detectable_by_effect;  // of each that was tried
 
   // what the pages show beside it
   std::vector<Round> rounds, curve_rounds;
@@ -92,6 +94,9 @@ std::vector<Effect> effects_of_other_axes(const Observations& observations);
 /// The protocol: seal, search on the open runs, open the seal once, estimate on all.
 Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
                     const SearchSettings& settings);
+
+/// The rows that the explanation's model and residuals are of.
+Observations without_set_aside(const Observations& observations, const Explanation& explanation);
 
 /// A parameter's unit on these data: without a calibration there are no volts, and what would be volts is in
 /// the response's unit.

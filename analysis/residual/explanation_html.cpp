@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <set>
 
 #include <fmt/format.h>
@@ -39,10 +38,9 @@ class Page {
   Page(const Explanation& explanation, const Observations& observations)
       : explanation_(explanation),
         observations_(without_set_aside(observations, explanation)),
-        rows_(static_cast<std::size_t>(observations_.rows())),
+        rows_(observations_.all_rows()),
         before_(-explanation.residual_before),
         after_(-explanation.residual_after) {
-    std::iota(rows_.begin(), rows_.end(), 0);
     predicted_ = predict_response(observations_, explanation.model, rows_);
   }
 
@@ -163,8 +161,24 @@ class Page {
     return json;
   }
 
+  /// n × c on the scale of y; where each group has its own amplitude, by that group's.
+  MatrixXd added_by(const AdoptedEffect& adopted) const {
+    const TermResponse response = respond(adopted.term, observations_, predicted_);
+    if (!adopted.term.per_group) return response.value[0];
+    MatrixXd added = response.derivative[0][0];
+    for (const int row : rows_) {
+      const auto group = static_cast<std::size_t>(observations_.group[static_cast<std::size_t>(row)]);
+      const auto& estimates = adopted.parameters[0].groups;
+      const auto own = std::find_if(estimates.begin(), estimates.end(), [&](const GroupEstimate& estimate) {
+        return estimate.group == observations_.group_name[group];
+      });
+      added.row(row) *= own == estimates.end() ? 0 : own->value;
+    }
+    return added;
+  }
+
   void add_effect(const AdoptedEffect& adopted, Json& list) const {
-    const MatrixXd added = visible(respond(adopted.term, observations_, predicted_).value[0]);
+    const MatrixXd added = visible(added_by(adopted));
     const MatrixXd fitted =
         observations_.multiplicative ? MatrixXd(added.array() * predicted_.array()) : added;
     std::vector<std::string> names = adopted.term.effect->covariates;

@@ -29,6 +29,7 @@ Json adopted_json(const AdoptedEffect& adopted) {
                                   {"ci95", {finite(parameter.low), finite(parameter.high)}},
                                   {"unit", parameter.unit},
                                   {"theory", parameter.theory}};
+    if (!parameter.run.empty()) parameters[parameter.name]["run"] = parameter.run;
     for (const GroupEstimate& group : parameter.groups)
       parameters[parameter.name]["groups"].push_back({{"group", group.group},
                                                       {"value", finite(group.value)},
@@ -63,9 +64,13 @@ Json unknown_json(const UnknownStructure& unknown) {
 std::string parameters_in_words(const AdoptedEffect& adopted) {
   std::string text;
   for (const ParameterEstimate& parameter : adopted.parameters) {
-    text += fmt::format("{}{} = {:.4g} {} [{:.4g}, {:.4g}]{}", text.empty() ? "" : ", ", parameter.name,
-                        parameter.value, parameter.unit == "1" ? "" : parameter.unit, parameter.low,
-                        parameter.high, parameter.theory ? " (theory)" : "");
+    const bool plain = parameter.unit == "1" || !parameter.run.empty();
+    text +=
+        fmt::format("{}{} = {}{} [{:.4g}, {:.4g}]{}", text.empty() ? "" : ", ", parameter.name,
+                    parameter.run.empty() ? fmt::format("{:.4g}", parameter.value)
+                                          : fmt::format("{} (run {:.0f})", parameter.run, parameter.value),
+                    plain ? "" : " " + parameter.unit, parameter.low, parameter.high,
+                    parameter.theory ? " (theory)" : "");
     if (parameter.groups.empty()) continue;
     const auto [least, most] =
         std::minmax_element(parameter.groups.begin(), parameter.groups.end(),
@@ -74,6 +79,18 @@ std::string parameters_in_words(const AdoptedEffect& adopted) {
                         least->value, least->group, most->value, most->group);
   }
   return text;
+}
+
+std::string detectable_in_words(const Explanation& e, const std::string& unit) {
+  std::string text = fmt::format("no effect above {:.3g}{} (rms) at 80 % power", e.detectable, unit);
+  if (e.detectable_by_effect.size() > 1) {
+    const auto [least, most] =
+        std::minmax_element(e.detectable_by_effect.begin(), e.detectable_by_effect.end(),
+                            [](const auto& a, const auto& b) { return a.second < b.second; });
+    text += fmt::format("; {} would have been seen from {:.3g}{}, {} from {:.3g}{}", least->first,
+                        least->second, unit, most->first, most->second, unit);
+  }
+  return text + "\n";
 }
 
 /// Lines that a terminal shows whole, indented.
@@ -130,6 +147,7 @@ std::string explanation_json(const Explanation& e) {
             {"untestable", Json::array()},
             {"suspect_rows", Json::array()},
             {"detectable_at_80_percent_power", finite(e.detectable)},
+            {"detectable_by_effect", e.detectable_by_effect},
             {"empirical", e.empirical},
             {"warnings", e.warnings}};
   for (const AdoptedEffect& adopted : e.adopted) json["adopted"].push_back(adopted_json(adopted));
@@ -170,8 +188,7 @@ std::string explanation_text(const Explanation& e) {
       e.noise_floor);
   if (!e.empirical.empty())
     text += fmt::format("after is with the empirical curve over {}\n", joined(e.empirical));
-  if (e.verdict == "no_structure")
-    text += fmt::format("no effect above {:.3g}{} (rms) at 80 % power\n", e.detectable, unit);
+  if (e.verdict == "no_structure") text += detectable_in_words(e, unit);
   if (!e.untestable.empty()) {
     text += "\nnot testable with these data:\n";
     std::map<std::string, std::vector<std::string>> by_reason;

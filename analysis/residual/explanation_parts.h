@@ -5,11 +5,6 @@
 
 namespace tunnelrig {
 
-std::vector<int> all_rows(const Observations& observations);
-
-/// The rows that the explanation's residuals are of.
-Observations without_set_aside(const Observations& observations, const Explanation& explanation);
-
 // --- conditions.cpp
 
 /// Effects that cannot be tried and why; conditions that never changed, and so keep an effect from being
@@ -19,6 +14,9 @@ void report_untestable(const Observations& observations, const std::vector<const
 
 /// Neighbouring runs that resemble each other, as the search found and allowed for.
 void warn_of_run_correlation(const Observations& observations, Explanation& explanation);
+
+/// Rows that stand for themselves, but resemble the row before them in what the model leaves.
+void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
 
 // --- estimates.cpp
 
@@ -59,7 +57,7 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
 std::optional<SuspectRow> gross_row(const Observations& observations);
 
 /// Those that no scatter, however heavy its tails, is likely to have made.
-std::vector<SuspectRow> gross_rows(const std::vector<SuspectRow>& suspects);
+std::vector<SuspectRow> gross_rows(const Observations& observations, const std::vector<SuspectRow>& suspects);
 
 /// A condition that in one row lies as far from the others as a typing error puts it, or a run far away.
 struct IsolatedValue {

@@ -170,9 +170,6 @@ Components difference(const Components& a, const Components& b) {
 
 namespace {
 
-/// v = b + g T: what a cell reads without a load is no force.
-bool is_line(const Observations& observations) { return observations.baseline.starts_with("linear:"); }
-
 /// The part of the baseline's lines beyond its constants: of each group, its own slopes fitted to `rows`.
 /// From the group's mean, or where the baseline is a line from no load.
 MatrixXd along_slopes(const Observations& observations, const MatrixXd& residual,
@@ -189,7 +186,7 @@ MatrixXd along_slopes(const Observations& observations, const MatrixXd& residual
     const MatrixXd slope = (x.rowwise() - middle)
                                .completeOrthogonalDecomposition()
                                .solve(MatrixXd(y.rowwise() - y.colwise().mean()));
-    const Eigen::RowVectorXd from = is_line(observations) ? Eigen::RowVectorXd::Zero(x.cols()) : middle;
+    const Eigen::RowVectorXd from = observations.is_line() ? Eigen::RowVectorXd::Zero(x.cols()) : middle;
     for (const int row : all.at(group)) result.row(row) = (observations.slopes.row(row) - from) * slope;
   }
   return result;
@@ -218,7 +215,7 @@ MatrixXd predict_response(const Observations& observations, const MeanModel& mod
       const Index group = observations.group[static_cast<std::size_t>(row)];
       Eigen::RowVectorXd constant =
           count(group) > 0 ? Eigen::RowVectorXd(sum.row(group) / count(group)) : overall;
-      if (is_line(observations)) constant.setZero();
+      if (observations.is_line()) constant.setZero();
       predicted.row(row) = observations.multiplicative
                                ? Eigen::RowVectorXd(observations.known.row(row).array() *
                                                     (constant + added.row(row)).array().exp())

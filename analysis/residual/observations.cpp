@@ -1,5 +1,7 @@
 #include "analysis/residual/observations.h"
 
+#include <numeric>
+
 namespace tunnelrig {
 namespace {
 
@@ -13,10 +15,17 @@ std::vector<T> picked(const std::vector<T>& from, const std::vector<int>& rows) 
 
 }  // namespace
 
+std::vector<int> Observations::all_rows() const {
+  std::vector<int> all(static_cast<std::size_t>(rows()));
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
 Observations Observations::subset(const std::vector<int>& kept) const {
   Observations part = *this;
   for (Eigen::MatrixXd* matrix : {&part.value, &part.known, &part.y, &part.slopes})
     *matrix = Eigen::MatrixXd((*matrix)(kept, Eigen::all));
+  for (Eigen::MatrixXd& course : part.shape) course = Eigen::MatrixXd(course(kept, Eigen::all));
   if (sign.size() > 0) part.sign = Eigen::VectorXd(sign(kept));
   part.duration_s = Eigen::VectorXd(duration_s(kept));
   for (Covariate& covariate : part.covariates)

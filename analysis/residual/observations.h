@@ -74,13 +74,16 @@ struct Observations {
   Eigen::Index channels() const { return y.cols(); }
   int groups() const { return static_cast<int>(group_name.size()); }
   int blocks() const { return static_cast<int>(block_name.size()); }
+  std::vector<int> all_rows() const;
+  /// v = b + g T of a cell: what it reads without a load is no force.
+  bool is_line() const { return baseline.starts_with("linear:"); }
   const Covariate* find(std::string_view wanted) const {
     for (const Covariate& covariate : covariates)
       if (covariate.name == wanted) return &covariate;
     return nullptr;
   }
 
-  /// The same of some rows only, for tables. Groups and blocks keep their numbers.
+  /// The same of some rows only. Groups and blocks keep their numbers.
   Observations subset(const std::vector<int>& kept) const;
 };
 

@@ -63,9 +63,10 @@ Source moving_rows(const ObservationTable& table, Observations& result) {
 /// A covariate's name: what it means where the schema says so, else its column.
 void add_covariates(const Source& source, Observations& result) {
   const TableSchema& schema = source.table.schema;
-  const auto add = [&](const std::string& name, std::string_view unit, const auto& value_of) {
+  const auto add = [&](const std::string& name, std::string_view unit, const auto& value_of,
+                       bool derived = false) {
     if (result.find(name) != nullptr) return;
-    Covariate covariate{.name = name, .value = MatrixXd(source.count(), 1), .unit = std::string(unit)};
+    Covariate covariate{name, MatrixXd(source.count(), 1), derived, std::string(unit)};
     Index missing = 0;
     for (Index r = 0; r < source.count(); ++r) {
       covariate.value(r, 0) = value_of(r);
@@ -81,7 +82,9 @@ void add_covariates(const Source& source, Observations& result) {
       add(column.meaning.empty() ? column.column : column.meaning, unit_after_conversion(column.unit),
           [&](Index r) { return source.converted(r, column); });
   if (schema.diameter_column || schema.diameter_m)
-    add("propeller_diameter_m", "m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); });
+    add(
+        "propeller_diameter_m", "m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); },
+        !schema.diameter_column);
   if (result.find("air_temperature_C") == nullptr) result.assumed.insert("air_temperature_C");
   add("air_temperature_C", "°C", [&](Index r) { return source.row(r).air_temperature_C; });
 }
@@ -116,18 +119,18 @@ bool scatters_alike(const TableSchema& schema, const ObservationChoice& choice) 
   if (!choice.response.empty() && choice.response != schema.response.column) return false;
   if (choice.baseline.starts_with("power:")) return false;
   if (!schema.scatter.empty()) return schema.scatter == "absolute";
-  return unit_from_name(schema.response.unit).quantity == unit_from_name("V").quantity;
+  return unit_from_name(schema.response.unit).quantity == "voltage";
 }
 
 /// Groups that pulled the other way are measured by magnitude; a response of both signs is kept as it is.
-void set_scale(Observations& result, bool alike, std::vector<std::size_t>& odd) {
+void set_scale(Observations& result, bool alike) {
   std::map<int, double> sign;
   for (Index r = 0; r < result.value.rows(); ++r)
     sign[result.group[static_cast<std::size_t>(r)]] += result.value(r, 0) > 0 ? 1 : -1;
+  bool one_sign = true;
   for (Index r = 0; r < result.value.rows(); ++r)
-    if (result.value(r, 0) * sign[result.group[static_cast<std::size_t>(r)]] <= 0)
-      odd.push_back(static_cast<std::size_t>(r));
-  result.multiplicative = odd.empty() && !alike;
+    one_sign = one_sign && result.value(r, 0) * sign[result.group[static_cast<std::size_t>(r)]] > 0;
+  result.multiplicative = one_sign && !alike;
   if (result.multiplicative) {
     result.sign = result.value.array().sign();
     result.value = result.value.cwiseAbs();
@@ -264,7 +267,7 @@ void set_other_axes(const TableSchema& schema, const std::string& baseline, Obse
     if (column.column == baseline) quantity = unit_from_name(column.unit).quantity;
   // A load that is the baseline need not be a covariate: the others' unit says what it is.
   for (const TableColumn& column : schema.covariates)
-    if (quantity.empty() && unit_from_name(column.unit).quantity == unit_from_name("N").quantity)
+    if (quantity.empty() && unit_from_name(column.unit).quantity == "force")
       quantity = unit_from_name(column.unit).quantity;
   for (const TableColumn& column : schema.covariates)
     if (column.column != baseline && column.column != result.response && !quantity.empty() &&
@@ -363,8 +366,7 @@ Observations observe_table(const ObservationTable& table, const ObservationChoic
   if (!(result.value.maxCoeff() > result.value.minCoeff()))
     throw InputError(fmt::format("the response {} is the same in every row: there is nothing to explain",
                                  result.response));
-  std::vector<std::size_t> odd;
-  set_scale(result, scatters_alike(table.schema, choice), odd);
+  set_scale(result, scatters_alike(table.schema, choice));
   add_covariates(source, result);
   set_previous(result);
   set_baseline(source, choice, result);

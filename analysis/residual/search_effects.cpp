@@ -295,17 +295,25 @@ JointFit Search::fit_without(std::size_t t) const {
   return fit_jointly(observations_, model, rows_);
 }
 
+/// Of what varies from session to session far more is needed than of what varies from run to run: so effect
+/// by effect, and the largest for all.
 void Search::set_detectable(const Scan& scan) {
-  std::vector<double> rms;
+  std::map<std::string, std::vector<double>> errors;  // rms of one standard error, of each way to try
   for (std::size_t i = 0; i < scan.candidates.size(); ++i) {
     if (scan.fits[i].likelihood_ratio <= 0) continue;
     const double z = std::sqrt(2 * scan.fits[i].likelihood_ratio);
     const double size = std::abs(scan.fits[i].amplitude(0)) * rms_of(scan.candidates[i].columns[0][0]);
-    if (size > 0) rms.push_back(size / z);
+    if (size > 0) errors[scan.ways[i].effect->name].push_back(size / z);
   }
-  if (rms.empty()) return;
-  std::nth_element(rms.begin(), rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2), rms.end());
-  result_.detectable_sigma = deviates(critical_) * rms[rms.size() / 2];
+  if (errors.empty()) return;
+  result_.detectable_sigma = 0;
+  for (auto& [name, rms] : errors) {
+    const auto middle = rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2);
+    std::nth_element(rms.begin(), middle, rms.end());
+    const double needed = deviates(critical_) * *middle;
+    result_.detectable_by_effect[name] = needed;
+    result_.detectable_sigma = std::max(result_.detectable_sigma, needed);
+  }
 }
 
 double Search::rms_of(const Eigen::MatrixXd& column) const {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <set>
 
 #include <fmt/format.h>
@@ -147,11 +146,8 @@ bool forces_differ(const Observations& observations) {
   const double n = static_cast<double>(observations.rows()), groups = observations.groups();
   if (n <= groups) return true;
   MatrixXd along_lines;  // where the baseline's lines, not its constants, are what makes forces differ
-  if (observations.slopes.cols() > 0) {
-    std::vector<int> rows(static_cast<std::size_t>(observations.rows()));
-    std::iota(rows.begin(), rows.end(), 0);
-    along_lines = predict_response(observations, {}, rows);
-  }
+  if (observations.slopes.cols() > 0)
+    along_lines = predict_response(observations, {}, observations.all_rows());
   for (Index c = 0; c < observations.channels(); ++c) {
     VectorXd sum = VectorXd::Zero(observations.groups()), count = sum;
     for (Index row = 0; row < observations.rows(); ++row) {
@@ -235,8 +231,7 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason = "the measured speed is part of the response";
   if (observations.coefficient && (effect.name == "nonlinearity" || effect.name == "bidirectional"))
     result.reason = "a coefficient is no force that a cell has read";
-  if (observations.baseline.starts_with("linear:") &&
-      (effect.name == "nonlinearity" || effect.name == "bidirectional"))
+  if (observations.is_line() && (effect.name == "nonlinearity" || effect.name == "bidirectional"))
     result.reason = "a curve over the baseline's column says where it is not straight";
   if (effect.needs_previous && std::all_of(observations.previous.begin(), observations.previous.end(),
                                            [](int before) { return before < 0; }))

@@ -259,16 +259,34 @@ TEST_F(ExplainTest, RivalsStayWithinTheirBounds) {
   EXPECT_THAT(e.adopted[0].confounded_with, testing::Not(Contains("excitation_voltage")));
 }
 
-TEST_F(ExplainTest, AGrossRowIsSuspectAndNamesNothing) {
-  Observations o = observations(16);
-  Eigen::MatrixXd y = o.y;
-  y(77, 2) += 0.05;
-  test::set_y(o, y);
+TEST_F(ExplainTest, AGrossRunIsSuspectAndNamesNothing) {
+  for (const double wrong : {0.02, 0.5}) {  // 10 σ and 250 σ
+    Observations o = observations(16);
+    Eigen::MatrixXd y = o.y;
+    y(77, 2) += wrong;
+    test::set_y(o, y);
+    const Explanation e = explained(o);
+    ASSERT_EQ(e.suspect_rows.size(), 1u) << wrong;
+    EXPECT_EQ(e.suspect_rows[0].row, o.name[77]);
+    EXPECT_GT(e.suspect_rows[0].studentised, 5) << "measured above predicted";
+    EXPECT_EQ(e.suspect_rows[0].set_aside, wrong > 0.1);
+    EXPECT_EQ(e.runs, wrong > 0.1 ? 127 : 128);
+    EXPECT_EQ(e.verdict, "no_structure") << wrong;
+  }
+}
+
+TEST_F(ExplainTest, WhatVariesBetweenSessionsIsSeenFromMore) {
+  Observations o = test::simulate(
+      {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .sigma = 0.002, .session_ratio = 2}, random);
+  test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
+  test::add_covariate(o, "air_pressure_Pa", 100500, 102500, random);
+  Covariate& pressure = o.covariates.back();
+  for (Eigen::Index row = 0; row < o.rows(); ++row) pressure.value(row, 0) = pressure.value(row - row % 8, 0);
   const Explanation e = explained(o);
-  ASSERT_EQ(e.suspect_rows.size(), 1u);
-  EXPECT_EQ(e.suspect_rows[0].row, o.name[77]);
-  EXPECT_GT(e.suspect_rows[0].studentised, 5) << "measured above predicted";
-  EXPECT_TRUE(e.adopted.empty());
+  const double between = e.detectable_by_effect.at("air_pressure");
+  EXPECT_GT(between, 2 * e.detectable_by_effect.at("supply_voltage"));
+  EXPECT_GE(e.detectable, between);
+  EXPECT_THAT(explanation_text(e), HasSubstr("would have been seen from"));
 }
 
 TEST_F(ExplainTest, WhatCannotVaryIsUntestableWithAReason) {

@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 
 /// Variances that are known: σ and one ratio for all strata.
 NullFit known_variances(const Observations& o, double sigma, std::size_t ratio) {
-  const std::size_t strata = MixedModel(o, test::all_rows(o)).strata().size();
+  const std::size_t strata = MixedModel(o, o.all_rows()).strata().size();
   return {.ratio = std::vector<std::size_t>(strata, ratio),
           .sigma = std::vector<double>(strata, sigma),
           .ratio_probability = {}};
@@ -27,7 +27,7 @@ struct Split {
 /// Every third block is held out; the blocks that first visit the groups stay.
 Split split_blocks(const Observations& o) {
   Split split;
-  for (const int row : test::all_rows(o))
+  for (const int row : o.all_rows())
     (o.block[static_cast<std::size_t>(row)] % 3 == 1 ? split.test : split.fit).push_back(row);
   return split;
 }
@@ -182,12 +182,12 @@ TEST(CrossValidation, LeavesOutEachBlockOnce) {
   std::mt19937_64 random(test::seed() + 5);
   const Observations o = test::simulate({.runs_of_block = {4, 6, 5, 3, 7, 5, 4, 6}}, random);
   const NullFit null = known_variances(o, 0.002, 3);
-  const CrossValidation validation = cross_validate(o, {o.y}, {}, null, test::all_rows(o));
+  const CrossValidation validation = cross_validate(o, {o.y}, {}, null, o.all_rows());
   ASSERT_EQ(validation.folds.size(), 8u);
   double squares = 0;
   for (int block = 0; block < 8; ++block) {
     std::vector<int> fit, held;
-    for (const int row : test::all_rows(o))
+    for (const int row : o.all_rows())
       (o.block[static_cast<std::size_t>(row)] == block ? held : fit).push_back(row);
     const HeldOutErrors direct = predict_held_out(o, {o.y}, {}, null, fit, held);
     EXPECT_EQ(validation.folds[static_cast<std::size_t>(block)].rows, held);
@@ -215,8 +215,7 @@ TEST(CrossValidation, ModelsAreToldApartByMuchAndSurely) {
 TEST(CrossValidation, ManyBlocksAreDealtOut) {
   std::mt19937_64 random(test::seed() + 6);
   const Observations o = test::simulate({.runs_of_block = std::vector<int>(60, 2)}, random);
-  const CrossValidation validation =
-      cross_validate(o, {o.y}, {}, known_variances(o, 0.002, 1), test::all_rows(o));
+  const CrossValidation validation = cross_validate(o, {o.y}, {}, known_variances(o, 0.002, 1), o.all_rows());
   EXPECT_EQ(validation.folds.size(), 24u);
   std::size_t rows = 0;
   for (const HeldOutErrors& fold : validation.folds) rows += fold.rows.size();

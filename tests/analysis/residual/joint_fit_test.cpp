@@ -32,7 +32,7 @@ TEST_F(JointFitTest, RecoversCreepAndPressure) {
     Observations o = observations(channels, 0, 2e-4);
     test::add_effect(o, "creep", {0.04, 90});
     test::add_effect(o, "air_pressure", {1.2});
-    const auto rows = test::all_rows(o);
+    const auto rows = o.all_rows();
     const JointFit fit = fit_jointly(o, {{term("creep", {0.02, 50}), term("air_pressure", {0.5})}, {}}, rows);
     EXPECT_TRUE(fit.converged);
     EXPECT_TRUE(fit.at_bound.empty());
@@ -58,7 +58,7 @@ TEST_F(JointFitTest, TheCourseWithinRunsSharpensTheTimeConstant) {
   test::add_effect(o, "creep", {0.04, 40});
   Observations means = o;
   means.shape.clear();
-  const auto rows = test::all_rows(o);
+  const auto rows = o.all_rows();
   const MeanModel start{{term("creep", {0.02, 80})}, {}};
   const auto error_of = [&](const Observations& data) {
     const JointFit fit = fit_jointly(data, start, rows);
@@ -75,7 +75,7 @@ TEST_F(JointFitTest, TheCourseWithinRunsSharpensTheTimeConstant) {
 TEST_F(JointFitTest, KeepsBoundsAndSaysSo) {
   Observations o = observations(1, 0, 2e-4);
   test::add_effect(o, "air_pressure", {4});  // physics allows 3
-  const JointFit fit = fit_jointly(o, {{term("air_pressure", {1})}, {}}, test::all_rows(o));
+  const JointFit fit = fit_jointly(o, {{term("air_pressure", {1})}, {}}, o.all_rows());
   EXPECT_EQ(fit.model.terms[0].parameters[0], 3);
   EXPECT_THAT(fit.at_bound, testing::ElementsAre("air_pressure exponent"));
 }
@@ -85,7 +85,7 @@ TEST_F(JointFitTest, TheorysCoefficientStays) {
   test::add_effect(o, "air_pressure", {1.4});
   MeanModel start{{term("air_pressure", {1})}, {}};
   start.terms[0].at_theory = true;
-  const JointFit fit = fit_jointly(o, start, test::all_rows(o));
+  const JointFit fit = fit_jointly(o, start, o.all_rows());
   EXPECT_EQ(fit.model.terms[0].parameters[0], 1);
   EXPECT_TRUE(fit.linear.columns.empty());
 }
@@ -96,7 +96,7 @@ TEST_F(JointFitTest, ACurveTakesWhatTheTermsLeave) {
   test::add_covariate(o, "humidity_of_paper", 0, 1, random);
   const MatrixXd wave = (6 * o.find("humidity_of_paper")->value.array()).sin();
   test::set_y(o, o.y + 0.01 * wave);
-  const auto rows = test::all_rows(o);
+  const auto rows = o.all_rows();
   MeanModel start{{term("creep", {0.02, 100})}, {}};
   const auto sigma = [&] { return fit_jointly(o, start, rows).variances.sigma[0]; };
   const double without = sigma();
@@ -111,7 +111,7 @@ TEST_F(JointFitTest, ACurveTakesWhatTheTermsLeave) {
 TEST_F(JointFitTest, RefitFollowsTheRuns) {
   Observations o = observations(1, 0, 2e-4);
   test::add_effect(o, "creep", {0.04, 90});
-  const auto rows = test::all_rows(o);
+  const auto rows = o.all_rows();
   const JointFit whole = fit_jointly(o, {{term("creep", {0.04, 90})}, {}}, rows);
   const MeanModel again = refit(o, whole.model, whole.variances, rows);
   EXPECT_NEAR(again.terms[0].parameters[0], whole.model.terms[0].parameters[0], 1e-4);

@@ -20,7 +20,7 @@ struct DenseFit {
   VectorXd amplitude;
 };
 DenseFit dense_fit(const Observations& o, const VectorXd& y, const MatrixXd& columns, double ratio) {
-  const std::vector<int> rows = test::all_rows(o);
+  const std::vector<int> rows = o.all_rows();
   const MatrixXd v = test::dense_covariance(o, rows, ratio), x = test::dense_baseline(o, rows, rows);
   MatrixXd all(x.rows(), x.cols() + columns.cols());
   all << x, columns;
@@ -56,7 +56,7 @@ TEST(Likelihood, NullIsTheDenseMaximum) {
   for (int i = 0; i < 30; ++i) {
     const Observations o =
         test::simulate({.runs_of_block = {3, 6, 4, 8, 5, 2, 7}, .session_ratio = 0.3 * i}, random);
-    const MixedModel model(o, test::all_rows(o));
+    const MixedModel model(o, o.all_rows());
     const NullFit null = CandidateScan(model, {}, {}).null_fit({o.y});
     std::size_t ratio = 0;
     const DenseFit dense = best_of(o, o.y.col(0), MatrixXd(o.rows(), 0), 0, kRatios.size() - 1, &ratio);
@@ -85,7 +85,7 @@ TEST(Likelihood, RatioOfACandidateIsTheDenseOne) {
       for (Index row = 0; row < o.rows(); ++row)
         column(row) = std::cos(1.0 + o.block[static_cast<std::size_t>(row)]);
     test::set_y(o, o.y + 0.0007 * (i % 5) * column);
-    const MixedModel model(o, test::all_rows(o));
+    const MixedModel model(o, o.all_rows());
     const CandidateScan scan(model, {}, {{.columns = {{column}}}});
     const NullFit null = scan.null_fit({o.y});
     const CandidateFit fit = scan.fit({o.y})[0];
@@ -103,7 +103,7 @@ TEST(Likelihood, AdoptedColumnsStayIn) {
   std::mt19937_64 random(test::seed() + 2);
   const Observations o = test::simulate({.session_ratio = 0}, random);
   const MatrixXd columns = normal_matrix(o.rows(), 2, random);
-  const MixedModel model(o, test::all_rows(o), {});
+  const MixedModel model(o, o.all_rows(), {});
   const Components first = {columns.col(0)}, second = {columns.col(1)};
   const CandidateScan scan(model, {first}, {{.columns = {second}}});
   const NullFit null = scan.null_fit({o.y});
@@ -121,10 +121,10 @@ TEST(Likelihood, EvidenceIsTheTailOfFisher) {
   o.blocks_are_rows = true;  // no session variance: ordinary least squares
   const MatrixXd column = normal_matrix(o.rows(), 1, random);
   test::set_y(o, o.y + 0.0004 * column);
-  const MixedModel model(o, test::all_rows(o));
+  const MixedModel model(o, o.all_rows());
   const CandidateFit fit = CandidateScan(model, {}, {{.columns = {{column}}}}).fit({o.y})[0];
   const VectorXd y = o.y.col(0);
-  const MatrixXd x = test::dense_baseline(o, test::all_rows(o), test::all_rows(o));
+  const MatrixXd x = test::dense_baseline(o, o.all_rows(), o.all_rows());
   MatrixXd all(x.rows(), x.cols() + 1);
   all << x, column;
   const auto rss = [&](const MatrixXd& m) {
@@ -142,7 +142,7 @@ TEST(Likelihood, TheWrongSignIsNoEvidence) {
   Observations o = test::simulate({}, random);
   const MatrixXd column = normal_matrix(o.rows(), 1, random);
   test::set_y(o, o.y - 0.01 * column);
-  const MixedModel model(o, test::all_rows(o));
+  const MixedModel model(o, o.all_rows());
   const auto fits =
       CandidateScan(
           model, {},
@@ -160,7 +160,7 @@ TEST(Likelihood, FourRotorsFindWhatOneRotorHas) {
   one.col(2) = normal_matrix(o.rows(), 1, random);
   const MatrixXd all = one.col(2).replicate(1, 4);
   test::set_y(o, o.y + 0.003 * one);
-  const MixedModel model(o, test::all_rows(o));
+  const MixedModel model(o, o.all_rows());
   const auto fits = CandidateScan(model, {}, {{.columns = {{one}}}, {.columns = {{all}}}}).fit({o.y});
   EXPECT_GT(fits[0].evidence, fits[1].evidence + 3);
   EXPECT_NEAR(fits[0].amplitude(0), 0.003, 0.0015);
@@ -175,7 +175,7 @@ TEST(NullFit, ScatterAllowsForWhatTheColumnsCost) {
     Observations o = test::simulate(
         {.runs_of_block = std::vector<int>(8, 1), .groups = 1, .sigma = kSigma, .session_ratio = 0}, random);
     o.blocks_are_rows = true;
-    const MixedModel model(o, test::all_rows(o));
+    const MixedModel model(o, o.all_rows());
     std::vector<Components> columns;
     for (int k = 0; k < 3; ++k) columns.push_back({Eigen::MatrixXd::Random(o.rows(), o.channels())});
     const NullFit fit = CandidateScan(model, columns, {}).null_fit({o.y});

@@ -171,7 +171,7 @@ TEST_P(MixedModelTest, BaselinePredictsAsDenseGeneralisedLeastSquares) {
 TEST_P(MixedModelTest, AGroupThatTheModelDoesNotHoldIsNotPredicted) {
   std::erase_if(rows, [&](int row) { return observations.group[static_cast<std::size_t>(row)] == 2; });
   const MixedModel model(observations, rows);
-  const auto all = test::all_rows(observations);
+  const auto all = observations.all_rows();
   const MatrixXd y = draw(static_cast<Index>(rows.size()) * model.strata()[0].modes, 1);
   const MatrixXd prediction = model.baseline_prediction(0, 3, y, all);
   const VectorXd variance = model.baseline_variance(0, 3, all);
@@ -202,7 +202,7 @@ TEST(MixedModel, BlocksOfSingleRowsHaveOneRatio) {
   std::mt19937_64 random(test::seed());
   Observations observations = test::simulate({.runs_of_block = std::vector<int>(20, 1)}, random);
   observations.blocks_are_rows = true;
-  EXPECT_EQ(MixedModel(observations, test::all_rows(observations)).ratios(), 1u);
+  EXPECT_EQ(MixedModel(observations, observations.all_rows()).ratios(), 1u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Rotors, MixedModelTest,
@@ -220,7 +220,7 @@ TEST(RunCorrelation, IsFoundWhereItIsAndNowhereElse) {
     for (int i = 0; i < kCampaigns; ++i) {
       Observations o =
           test::simulate({.runs_of_block = std::vector<int>(13, 12), .groups = 40, .channels = 4}, random);
-      const MixedModel model(o, test::all_rows(o));
+      const MixedModel model(o, o.all_rows());
       const Components y = {o.y};
       NullFit fit = CandidateScan(model, {}, {}).null_fit(y);
       const Stacked drawn = model.simulate(1, {1.0}, {fit.ratio[1]}, truth, random);

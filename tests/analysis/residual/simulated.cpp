@@ -1,7 +1,6 @@
 #include "analysis/residual/simulated.h"
 
 #include <algorithm>
-#include <numeric>
 #include <set>
 
 #include <fmt/format.h>
@@ -89,12 +88,6 @@ std::vector<const Effect*> every_effect() {
   std::vector<const Effect*> result;
   for (const Effect& effect : all_effects()) result.push_back(&effect);
   return result;
-}
-
-std::vector<int> all_rows(const Observations& observations) {
-  std::vector<int> rows(static_cast<std::size_t>(observations.rows()));
-  std::iota(rows.begin(), rows.end(), 0);
-  return rows;
 }
 
 MatrixXd dense_covariance(const Observations& observations, const std::vector<int>& rows, double ratio,

@@ -36,7 +36,6 @@ void add_effect(Observations& observations, const std::string& name, const std::
 
 const Effect& effect_named(const std::string& name);
 std::vector<const Effect*> every_effect();
-std::vector<int> all_rows(const Observations& observations);
 
 /// Φ + a 11ᵀ in each block of `rows`, Φ_ij = φ^|i − j|.
 Eigen::MatrixXd dense_covariance(const Observations& observations, const std::vector<int>& rows, double ratio,

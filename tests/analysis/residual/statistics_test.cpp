@@ -39,7 +39,7 @@ struct Statistics : testing::Test {
   }
 
   static std::vector<Candidate> candidates_of(const Observations& o) {
-    const auto rows = test::all_rows(o);
+    const auto rows = o.all_rows();
     const MatrixXd predicted = predict_response(o, {}, rows);
     std::vector<Candidate> candidates;
     for (const Term& way : all_ways(test::every_effect(), o, rows)) {
@@ -67,7 +67,7 @@ TEST_F(Statistics, POfANullCampaignIsUniform) {
     std::vector<double> all;
     for (std::size_t i = 0; i < kCampaigns; ++i) {
       const Observations o = campaign(session_ratio, 1, 0);
-      const MixedModel model(o, test::all_rows(o));
+      const MixedModel model(o, o.all_rows());
       const CandidateScan scan(model, {}, candidates_of(o));
       double largest = 0;
       for (const CandidateFit& fit : scan.fit({o.y})) largest = std::max(largest, fit.evidence);
@@ -96,7 +96,7 @@ TEST_F(Statistics, NullCampaignsOfFourRotorsAreRarelyNamed) {
   for (int i = 0; i < kCampaigns; ++i) {
     const Observations o = campaign(0.4 * (i % 4), 4, 0);
     settings.seed = static_cast<std::uint64_t>(i + 1);
-    const Attribution found = attribute(o, test::all_rows(o), test::every_effect(), settings);
+    const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
     named += found.accepted.empty() ? 0 : 1;
   }
   std::cout << named << " of " << kCampaigns << " named\n";
@@ -116,7 +116,7 @@ TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
       slow.value(row, 0) = std::sin(0.5 * static_cast<double>(row));
     o.covariates.push_back(std::move(slow));
     settings.seed = static_cast<std::uint64_t>(i + 1);
-    const Attribution found = attribute(o, test::all_rows(o), test::every_effect(), settings);
+    const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
     said += found.accepted.empty() && found.curves.empty() ? 0 : 1;
     seen += found.observations.run_correlation[1] > 0.4 ? 1 : 0;
   }
@@ -132,7 +132,7 @@ TEST_F(Statistics, FittedParametersScatterAsTheirErrorsSay) {
   for (int i = 0; i < kCampaigns; ++i) {
     Observations o = campaign(1, 1, 0);
     test::add_effect(o, "supply_voltage", {0.4});
-    const auto rows = test::all_rows(o);
+    const auto rows = o.all_rows();
     const Term start{.effect = &test::effect_named("supply_voltage"), .parameters = {0.2}};
     const JointFit fit = fit_jointly(o, {{start}, {}}, rows);
     const AmplitudeFit errors = fit_amplitudes(o, {o.y}, fit.linear.columns, fit.variances, rows);

@@ -129,10 +129,11 @@ TEST_F(TablesTest, GroupsWithExponentsOfTheirOwnAreTold) {
     csv += fmt::format("p{},{},{}\n", r % 2, volts,
                        (5 + r % 2) * std::pow(volts / kMiddle_V, exponent) * (1 + 0.002 * scatter(random)));
   }
-  const Explanation e =
-      explained(observed(csv,
-                         "groups = [\"p\"]\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
-                         "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n"));
+  const Observations o =
+      observed(csv,
+               "groups = [\"p\"]\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+               "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n");
+  const Explanation e = explained(o);
   ASSERT_EQ(names(e), "supply_voltage ");
   const ParameterEstimate& exponent = e.adopted[0].parameters[0];
   ASSERT_EQ(exponent.groups.size(), 2u);
@@ -145,6 +146,49 @@ TEST_F(TablesTest, GroupsWithExponentsOfTheirOwnAreTold) {
   EXPECT_EQ(
       nlohmann::json::parse(explanation_json(e))["adopted"][0]["parameters"]["exponent"]["groups"].size(),
       2u);
+  // The page draws what each group has: the line through the points, not the median's and not none.
+  const std::string html = explanation_html(e, o, {}, {}),
+                    start = R"(<script type="application/json" id="data">)";
+  const std::size_t from = html.find(start) + start.size();
+  const auto panel =
+      nlohmann::json::parse(html.substr(from, html.find("</script>", from) - from))["panels"][0];
+  double fitted2 = 0, after2 = 0;
+  for (std::size_t i = 0; i < panel["x"].size(); ++i) {
+    fitted2 += std::pow(panel["fitted"][i].get<double>(), 2);
+    after2 += std::pow(panel["after"][i].get<double>(), 2);
+  }
+  EXPECT_GT(fitted2, 100 * after2);
+}
+
+/// Rows that drift by themselves, each taken as a block.
+TEST_F(TablesTest, RowsThatResembleTheRowBeforeAreWarnedOf) {
+  for (const double kept : {0.0, 0.8}) {
+    std::string csv = "y\n";
+    double drift = 0;
+    for (int r = 0; r < 80; ++r) {
+      drift = kept * drift + scatter(random);
+      csv += fmt::format("{}\n", 100 + drift);
+    }
+    const Explanation e = explained(observed(csv, "[response]\ncolumn = \"y\"\nunit = \"N\"\n"));
+    const auto warned = testing::Contains(HasSubstr("rows resemble the row before them"));
+    if (kept > 0)
+      EXPECT_THAT(e.warnings, warned);
+    else
+      EXPECT_THAT(e.warnings, testing::Not(warned));
+  }
+}
+
+TEST_F(TablesTest, AConditionThatNeverChangesIsWarnedOf) {
+  std::string csv = "y,h,own\n";
+  for (int r = 0; r < 40; ++r) csv += fmt::format("{},0.4,7\n", 100 + scatter(random));
+  const Explanation e = explained(
+      observed(csv,
+               "[response]\ncolumn = \"y\"\nunit = \"N\"\n[[covariates]]\ncolumn = \"h\"\nunit = \"1\"\n"
+               "meaning = \"relative_humidity\"\n[[covariates]]\ncolumn = \"own\"\nunit = \"1\"\n"));
+  for (const char* name : {"relative_humidity", "own"})
+    EXPECT_THAT(e.warnings, Contains(HasSubstr(std::string(name) + " is the same in every row")));
+  EXPECT_TRUE(std::any_of(e.untestable.begin(), e.untestable.end(),
+                          [](const Untestable& u) { return u.effect == "air_humidity"; }));
 }
 
 /// A cell that is pulled reads below zero; what its zero does is added all the same.
@@ -173,7 +217,7 @@ TEST_F(TablesTest, CurvesDoNotSwingInAGap) {
                                   "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
                                   "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\n");
   std::size_t most = 0;
-  for (const Curve& curve : curves_to_try(o, all_rows(o)))
+  for (const Curve& curve : curves_to_try(o, o.all_rows()))
     if (curve.covariate == "V") most = std::max(most, curve.columns.size());
   EXPECT_EQ(most, 2u);
 }
@@ -220,6 +264,8 @@ TEST_F(TablesTest, AStepInASealedSessionIsPlacedThere) {
   EXPECT_TRUE(e.adopted[0].term.effect->has_change_point());
   const ParameterEstimate& run = e.adopted[0].parameters[1];
   EXPECT_EQ(run.value, first);
+  EXPECT_EQ(run.run, o.name[static_cast<std::size_t>(first)]);
+  EXPECT_THAT(explanation_text(e), HasSubstr(run.run));
   EXPECT_LE(run.low, first);
   EXPECT_GE(run.high, first);
 }

@@ -70,7 +70,7 @@ TEST(Terms, DerivativesAreFiniteDifferencesOfTheValue) {
   for (const Effect& effect : all_effects()) {
     if (!testability(effect, o).ok()) continue;
     SCOPED_TRACE(effect.name + " " + effect.form);
-    const std::vector<Term> ways = ways_to_try(effect, o, test::all_rows(o));
+    const std::vector<Term> ways = ways_to_try(effect, o, o.all_rows());
     Term term = ways.at(ways.size() / 2);
     term.parameters[0] = 0.3 * std::min(effect.parameters[0].upper, 0.1);
     const TermResponse response = respond(term, o, o.value);
@@ -114,7 +114,7 @@ TEST(Terms, ChangePointsLeaveThreeBlocksOnEachSide) {
         test::simulate({.runs_of_block = std::vector<int>(static_cast<std::size_t>(blocks + 3), 4)}, random);
     add_every_covariate(o, random);
     std::vector<int> rows;  // three blocks are sealed
-    for (const int row : test::all_rows(o)) {
+    for (const int row : o.all_rows()) {
       const int block = o.block[static_cast<std::size_t>(row)];
       if (block != 1 && block != 3 && block != blocks) rows.push_back(row);
     }
@@ -137,7 +137,7 @@ TEST(Terms, WaysAreRotorsShapesAndPairs) {
   std::mt19937_64 random(test::seed() + 4);
   Observations o = test::simulate({.channels = 4}, random);
   add_every_covariate(o, random);
-  const auto rows = test::all_rows(o);
+  const auto rows = o.all_rows();
   EXPECT_EQ(ways_to_try(test::effect_named("air_pressure"), o, rows).size(), 1u);
   EXPECT_EQ(ways_to_try(test::effect_named("nonlinearity"), o, rows).size(), 5u)
       << "all alike, or one of four";
@@ -152,7 +152,7 @@ TEST(Terms, RegressorsSeeMeasuredForcesThroughTheGroupsConstantOnly) {
   std::mt19937_64 random(test::seed() + 5);
   Observations o = test::simulate({.channels = 2}, random);
   add_every_covariate(o, random);
-  const auto rows = test::all_rows(o);
+  const auto rows = o.all_rows();
   // Two runs of one group, apart from each other, move in opposite ways: the group's constant stays.
   const auto group = [&](int row) { return o.group[static_cast<std::size_t>(row)]; };
   int first = 5, second = first + 10;
@@ -183,11 +183,11 @@ TEST(Terms, SealedRunsDoNotEnterThePrediction) {
   std::mt19937_64 random(test::seed() + 6);
   Observations o = test::simulate({}, random);
   std::vector<int> open;
-  for (const int row : test::all_rows(o))
+  for (const int row : o.all_rows())
     if (o.block[static_cast<std::size_t>(row)] % 4 != 2) open.push_back(row);
   const MatrixXd predicted = predict_response(o, {}, open);
   MatrixXd y = o.y;
-  for (const int row : test::all_rows(o))
+  for (const int row : o.all_rows())
     if (o.block[static_cast<std::size_t>(row)] % 4 == 2) y.row(row).array() += 0.3;
   test::set_y(o, y);
   EXPECT_EQ((predict_response(o, {}, open) - predicted).norm(), 0);
