@@ -22,32 +22,70 @@ MatrixXd orthonormal_modes(Index channels) {
   return Eigen::HouseholderQR<MatrixXd>(modes).householderQ();
 }
 
-/// Φ^(−½) makes a block's 1 to (1, w, w, …).
-double weight_of_later(double run_correlation) {
-  return run_correlation == 0 ? 1 : std::sqrt((1 - run_correlation) / (1 + run_correlation));
-}
+/// (Φ + a 11ᵀ)^(−½) = (I − share w wᵀ) A, block by block: A = Φ^(−½) takes from each run what the one before
+/// it foretells, and makes 1 to w = (1, later, later, …).
+class Root {
+ public:
+  Root(const std::vector<std::vector<Index>>& blocks, double session_ratio, double run_correlation)
+      : blocks_(blocks),
+        session_ratio_(session_ratio),
+        correlation_(run_correlation),
+        scale_(1 / std::sqrt(1 - run_correlation * run_correlation)),
+        later_(std::sqrt((1 - run_correlation) / (1 + run_correlation))) {
+    for (std::size_t b = 0; b < blocks.size(); ++b)
+      share_.push_back((1 - 1 / std::sqrt(1 + session_ratio * squared_norm(b))) / squared_norm(b));
+  }
+
+  double scale() const { return scale_; }
+  double later() const { return later_; }
+  /// wᵀw
+  double squared_norm(std::size_t block) const {
+    return 1 + later_ * later_ * static_cast<double>(blocks_[block].size() - 1);
+  }
+
+  void apply(Eigen::Ref<MatrixXd> columns) const {
+    for (Index c = 0; c < columns.cols(); ++c)
+      for (std::size_t b = 0; b < blocks_.size(); ++b) {
+        const auto& runs = blocks_[b];
+        for (std::size_t k = runs.size() - 1; k > 0 && correlation_ != 0; --k)
+          columns(runs[k], c) = scale_ * (columns(runs[k], c) - correlation_ * columns(runs[k - 1], c));
+        shrink(b, columns.col(c));
+      }
+  }
+
+  void apply_transposed(Eigen::Ref<MatrixXd> columns) const {
+    for (Index c = 0; c < columns.cols(); ++c)
+      for (std::size_t b = 0; b < blocks_.size(); ++b) {
+        const auto& runs = blocks_[b];
+        shrink(b, columns.col(c));
+        for (std::size_t k = 0; k < runs.size() && correlation_ != 0; ++k) {
+          if (k > 0) columns(runs[k], c) *= scale_;
+          if (k + 1 < runs.size()) columns(runs[k], c) -= scale_ * correlation_ * columns(runs[k + 1], c);
+        }
+      }
+  }
+
+ private:
+  void shrink(std::size_t block, Eigen::Ref<Eigen::VectorXd> column) const {
+    if (session_ratio_ == 0) return;
+    const auto& runs = blocks_[block];
+    double sum = 0;
+    for (std::size_t k = 1; k < runs.size(); ++k) sum += column(runs[k]);
+    const double mean = share_[block] * (column(runs[0]) + later_ * sum);
+    column(runs[0]) -= mean;
+    for (std::size_t k = 1; k < runs.size(); ++k) column(runs[k]) -= later_ * mean;
+  }
+
+  const std::vector<std::vector<Index>>& blocks_;
+  double session_ratio_, correlation_, scale_, later_;
+  std::vector<double> share_;  // of each block
+};
 
 }  // namespace
 
 void whiten(const std::vector<std::vector<Index>>& blocks, double session_ratio, double run_correlation,
             Eigen::Ref<MatrixXd> columns) {
-  // Φ^(−½) takes from each run what the one before it foretells.
-  const double scale = 1 / std::sqrt(1 - run_correlation * run_correlation);
-  const double w = weight_of_later(run_correlation);
-  Eigen::RowVectorXd mean(columns.cols());
-  for (const auto& runs : blocks) {
-    if (run_correlation != 0)
-      for (std::size_t k = runs.size() - 1; k > 0; --k)
-        columns.row(runs[k]) = scale * (columns.row(runs[k]) - run_correlation * columns.row(runs[k - 1]));
-    if (session_ratio == 0) continue;
-    const double n = 1 + w * w * static_cast<double>(runs.size() - 1);
-    const double share = (1 - 1 / std::sqrt(1 + session_ratio * n)) / n;
-    mean = columns.row(runs[0]);
-    for (std::size_t k = 1; k < runs.size(); ++k) mean += w * columns.row(runs[k]);
-    mean *= share;
-    columns.row(runs[0]) -= mean;
-    for (std::size_t k = 1; k < runs.size(); ++k) columns.row(runs[k]) -= w * mean;
-  }
+  Root(blocks, session_ratio, run_correlation).apply(columns);
 }
 
 MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
@@ -76,19 +114,14 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
   }
   if (observations.blocks_are_rows) ratios_ = 1;
   for (auto& [block, runs] : blocks) blocks_.push_back(std::move(runs));
+  set_groups();
   const bool alike = observations.channels() == 1 || run_correlation_[0] == run_correlation_[1];
-  const auto wanted = [&](std::size_t r) {
-    return ratio.empty() || std::find(ratio.begin(), ratio.end(), r) != ratio.end();
-  };
-  for (std::size_t s = 0; s < (alike ? 1U : 2U); ++s) {
-    prepared_[s].resize(ratios_);
-    for (std::size_t r = 0; r < ratios_; ++r)
-      if (wanted(r)) prepared_[s][r] = prepare(r, run_correlation_[s]);
-  }
+  std::set<std::size_t> wanted(ratio.begin(), ratio.end());
+  for (std::size_t r = 0; r < ratios_ && ratio.empty(); ++r) wanted.insert(r);
+  for (std::size_t s = 0; s < (alike ? 1U : 2U); ++s) prepared_[s] = prepare(run_correlation_[s], wanted);
   log_determinant_.assign(strata_.size(), std::vector<double>(ratios_));
   for (std::size_t s = 0; s < strata_.size(); ++s)
-    for (std::size_t r = 0; r < ratios_; ++r)
-      if (wanted(r)) log_determinant_[s][r] = make_log_determinant(s, r);
+    for (const std::size_t r : wanted) log_determinant_[s][r] = make_log_determinant(s, r);
 }
 
 double MixedModel::run_correlation(std::size_t stratum) const {
@@ -99,70 +132,93 @@ const MixedModel::Prepared& MixedModel::prepared(std::size_t stratum, std::size_
   return prepared_[prepared_[1].empty() ? 0 : strata_[stratum].side()][ratio];
 }
 
-MatrixXd MixedModel::baseline_of(const std::vector<int>& rows, const std::vector<int>& groups) const {
+void MixedModel::set_groups() {
+  std::map<int, std::vector<int>> rows_of_group;
+  for (const int row : rows_)
+    rows_of_group[observations_.group[static_cast<std::size_t>(row)]].push_back(row);
   const Index each = 1 + observations_.slopes.cols();
-  MatrixXd baseline =
-      MatrixXd::Zero(static_cast<Index>(rows.size()), static_cast<Index>(groups.size()) * each);
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    const auto row = static_cast<Index>(r);
-    const int own = observations_.group[static_cast<std::size_t>(rows[r])];
-    const auto group = std::lower_bound(groups.begin(), groups.end(), own);
-    if (group == groups.end() || *group != own) {
-      baseline.row(row).setConstant(std::numeric_limits<double>::quiet_NaN());
-      continue;
+  for (const auto& [number, rows] : rows_of_group) {
+    MatrixXd columns(static_cast<Index>(rows.size()), each);
+    columns << Eigen::VectorXd::Ones(columns.rows()), observations_.slopes(rows, Eigen::all);
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(columns);
+    const Index rank = qr.rank();
+    const MatrixXd r = qr.matrixQR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
+    GroupBaseline& group = groups_[number];
+    group.first = columns_;
+    group.to_orthonormal = MatrixXd::Zero(each, each);
+    group.to_orthonormal.leftCols(rank) =
+        MatrixXd(qr.colsPermutation()).leftCols(rank) *
+        r.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(rank, rank));
+    log_of_groups_ += 2 * r.diagonal().array().abs().log().sum();
+    columns_ += each;
+    baseline_columns_ += rank;
+  }
+  own_.resize(static_cast<Index>(rows_.size()), each);
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    const GroupBaseline& group = groups_.at(observations_.group[static_cast<std::size_t>(rows_[k])]);
+    first_column_.push_back(group.first);
+    own_.row(static_cast<Index>(k)) = baseline_row(group, rows_[k]);
+  }
+}
+
+Eigen::RowVectorXd MixedModel::baseline_row(const GroupBaseline& group, int row) const {
+  Eigen::RowVectorXd plain(1 + observations_.slopes.cols());
+  plain << 1, observations_.slopes.row(row);
+  return plain * group.to_orthonormal;
+}
+
+std::vector<MixedModel::Prepared> MixedModel::prepare(double run_correlation,
+                                                      const std::set<std::size_t>& ratio) const {
+  // V⁻¹ = AᵀA − Σ a/(1 + a wᵀw) Aᵀw wᵀA, a block's A L having two runs in a row at most.
+  const Root root(blocks_, 0, run_correlation);
+  const Index each = own_.cols();
+  MatrixXd independent = MatrixXd::Zero(columns_, columns_);
+  MatrixXd sessions = MatrixXd::Zero(columns_, static_cast<Index>(blocks_.size()));
+  for (std::size_t b = 0; b < blocks_.size(); ++b)
+    for (std::size_t k = 0; k < blocks_[b].size(); ++k) {
+      struct Part {
+        Index first;
+        Eigen::RowVectorXd values;
+      };
+      std::vector<Part> row;
+      const auto add = [&](Index run, double weight) {
+        row.push_back({first_column_[static_cast<std::size_t>(run)], weight * own_.row(run)});
+      };
+      add(blocks_[b][k], k == 0 ? 1 : root.scale());
+      if (k > 0 && run_correlation != 0) add(blocks_[b][k - 1], -run_correlation * root.scale());
+      for (const Part& one : row) {
+        sessions.col(static_cast<Index>(b)).segment(one.first, each) +=
+            (k == 0 ? 1 : root.later()) * one.values.transpose();
+        for (const Part& other : row)
+          independent.block(one.first, other.first, each, each) += one.values.transpose() * other.values;
+      }
     }
-    const Index first = (group - groups.begin()) * each;
-    baseline(row, first) = 1;
-    baseline.row(row).segment(first + 1, each - 1) = observations_.slopes.row(rows[r]);
+  std::vector<Prepared> result(ratios_);
+  for (const std::size_t r : ratio) {
+    MatrixXd normal = independent;
+    if (kRatios[r] > 0) {
+      Eigen::VectorXd weight(sessions.cols());
+      for (std::size_t b = 0; b < blocks_.size(); ++b)
+        weight(static_cast<Index>(b)) = std::sqrt(kRatios[r] / (1 + kRatios[r] * root.squared_norm(b)));
+      normal.selfadjointView<Eigen::Lower>().rankUpdate(sessions * weight.asDiagonal(), -1);
+    }
+    for (const auto& [number, group] : groups_)
+      for (Index k = 0; k < each; ++k)
+        if (group.to_orthonormal.col(k).isZero(0)) normal(group.first + k, group.first + k) = 1;
+    result[r].normal.compute(normal);
+    result[r].log_xvx = log_of_groups_ + 2 * result[r].normal.matrixLLT().diagonal().array().log().sum();
   }
-  return baseline;
+  return result;
 }
 
-MixedModel::Part MixedModel::decompose(std::size_t ratio, double run_correlation, std::vector<Index> runs,
-                                       std::vector<int> groups) const {
-  std::vector<int> rows;
-  for (const Index run : runs) rows.push_back(rows_[static_cast<std::size_t>(run)]);
-  MatrixXd baseline = baseline_of(rows, groups);
-  if (ratio > 0 || run_correlation != 0)  // then the part holds all runs
-    whiten(blocks_, kRatios[ratio], run_correlation, baseline);
-  Part part{.runs = std::move(runs),
-            .groups = std::move(groups),
-            .qr = baseline.colPivHouseholderQr(),
-            .basis = {}};
-  // Slopes may be collinear with the constants: only the columns of full rank count.
-  part.basis = part.qr.householderQ() * MatrixXd::Identity(baseline.rows(), part.qr.rank());
-  return part;
-}
-
-MixedModel::Prepared MixedModel::prepare(std::size_t ratio, double run_correlation) {
-  std::map<int, std::vector<Index>> runs_of_group;
-  for (std::size_t r = 0; r < rows_.size(); ++r)
-    runs_of_group[observations_.group[static_cast<std::size_t>(rows_[r])]].push_back(static_cast<Index>(r));
-  Prepared prepared;
-  if (ratio == 0 && run_correlation == 0) {  // each group stands for itself: small systems, not one large one
-    for (const auto& [group, runs] : runs_of_group)
-      prepared.parts.push_back(decompose(ratio, run_correlation, runs, {group}));
-  } else {
-    std::vector<Index> all(rows_.size());
-    std::iota(all.begin(), all.end(), Index{0});
-    std::vector<int> groups;
-    for (const auto& [group, runs] : runs_of_group) groups.push_back(group);
-    prepared.parts.push_back(decompose(ratio, run_correlation, std::move(all), std::move(groups)));
-  }
-  baseline_columns_ = 0;
-  for (const Part& part : prepared.parts) {
-    baseline_columns_ += part.basis.cols();
-    prepared.log_xvx += 2 * part.qr.matrixQR().diagonal().head(part.basis.cols()).array().abs().log().sum();
-  }
-  return prepared;
-}
-
-std::vector<Index> MixedModel::rows_of(const Part& part, const std::vector<int>& rows) const {
-  std::vector<Index> result;
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    if (std::binary_search(part.groups.begin(), part.groups.end(),
-                           observations_.group[static_cast<std::size_t>(rows[r])]))
-      result.push_back(static_cast<Index>(r));
+MatrixXd MixedModel::baseline_coefficients(std::size_t stratum, std::size_t ratio, MatrixXd whitened) const {
+  Root(blocks_, kRatios[ratio], run_correlation(stratum)).apply_transposed(whitened);
+  MatrixXd result = MatrixXd::Zero(columns_, whitened.cols());
+  for (Index c = 0; c < whitened.cols(); ++c)
+    for (Index k = 0; k < own_.cols(); ++k)
+      for (Index run = 0; run < whitened.rows(); ++run)
+        result(first_column_[static_cast<std::size_t>(run)] + k, c) += own_(run, k) * whitened(run, c);
+  prepared(stratum, ratio).normal.solveInPlace(result);
   return result;
 }
 
@@ -172,13 +228,12 @@ Index MixedModel::dof(std::size_t stratum) const {
 }
 
 double MixedModel::make_log_determinant(std::size_t stratum, std::size_t ratio) const {
-  const double correlation = run_correlation(stratum), less = 1 - correlation * correlation;
-  const double w = weight_of_later(correlation);
+  const double correlation = run_correlation(stratum);
+  const Root root(blocks_, kRatios[ratio], correlation);
   double log_v = 0;
-  for (const auto& runs : blocks_) {
-    const auto after_first = static_cast<double>(runs.size() - 1);
-    log_v += after_first * std::log(less) + std::log1p(kRatios[ratio] * (1 + w * w * after_first));
-  }
+  for (std::size_t b = 0; b < blocks_.size(); ++b)
+    log_v += static_cast<double>(blocks_[b].size() - 1) * std::log(1 - correlation * correlation) +
+             std::log1p(kRatios[ratio] * root.squared_norm(b));
   return 0.5 * strata_[stratum].modes *
          (log_v + (strata_[stratum].means() ? prepared(stratum, ratio).log_xvx : 0));
 }
@@ -198,17 +253,17 @@ Stacked MixedModel::stack(std::size_t stratum, const std::vector<const Component
 void MixedModel::project(std::size_t stratum, std::size_t ratio, Stacked& columns) const {
   const Index n = static_cast<Index>(rows_.size());
   Eigen::Map<MatrixXd> by_mode(columns.data(), n, columns.size() / n);
-  whiten(blocks_, kRatios[ratio], run_correlation(stratum), by_mode);
-  if (!strata_[stratum].means()) return;
-  const auto& parts = prepared(stratum, ratio).parts;
-  if (parts.size() == 1) {
-    by_mode.noalias() -= parts[0].basis * (parts[0].basis.transpose() * by_mode);
-    return;
+  const Root root(blocks_, kRatios[ratio], run_correlation(stratum));
+  if (strata_[stratum].means()) {
+    MatrixXd whitened = by_mode;
+    root.apply(whitened);
+    const MatrixXd coefficients = baseline_coefficients(stratum, ratio, std::move(whitened));
+    for (Index c = 0; c < by_mode.cols(); ++c)
+      for (Index k = 0; k < own_.cols(); ++k)
+        for (Index run = 0; run < n; ++run)
+          by_mode(run, c) -= own_(run, k) * coefficients(first_column_[static_cast<std::size_t>(run)] + k, c);
   }
-  for (const Part& part : parts) {
-    const MatrixXd own = by_mode(part.runs, Eigen::all);
-    by_mode(part.runs, Eigen::all) -= part.basis * (part.basis.transpose() * own);
-  }
+  root.apply(by_mode);
 }
 
 Stacked MixedModel::baseline_prediction(std::size_t stratum, std::size_t ratio, const Stacked& columns,
@@ -217,37 +272,42 @@ Stacked MixedModel::baseline_prediction(std::size_t stratum, std::size_t ratio, 
   const Index modes = strata_[stratum].modes;
   Stacked result = Stacked::Zero(wanted * modes, columns.cols());
   if (!strata_[stratum].means()) return result;
-  result.setConstant(std::numeric_limits<double>::quiet_NaN());
   MatrixXd by_mode = Eigen::Map<const MatrixXd>(columns.data(), n, modes * columns.cols());
   whiten(blocks_, kRatios[ratio], run_correlation(stratum), by_mode);
+  const MatrixXd coefficients = baseline_coefficients(stratum, ratio, std::move(by_mode));
   Eigen::Map<MatrixXd> predicted(result.data(), wanted, modes * columns.cols());
-  for (const Part& part : prepared(stratum, ratio).parts) {
-    const std::vector<Index> where = rows_of(part, rows);
-    if (where.empty()) continue;
-    std::vector<int> asked;
-    for (const Index r : where) asked.push_back(rows[static_cast<std::size_t>(r)]);
-    predicted(where, Eigen::all) =
-        baseline_of(asked, part.groups) * part.qr.solve(MatrixXd(by_mode(part.runs, Eigen::all)));
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const auto group = groups_.find(observations_.group[static_cast<std::size_t>(rows[r])]);
+    if (group == groups_.end())
+      predicted.row(static_cast<Index>(r)).setConstant(std::numeric_limits<double>::quiet_NaN());
+    else
+      predicted.row(static_cast<Index>(r)) =
+          baseline_row(group->second, rows[r]) * coefficients.middleRows(group->second.first, own_.cols());
   }
   return result;
 }
 
 Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t ratio,
                                               const std::vector<int>& rows) const {
-  if (!strata_[stratum].means()) return Eigen::VectorXd::Zero(static_cast<Index>(rows.size()));
-  Eigen::VectorXd result =
-      Eigen::VectorXd::Constant(static_cast<Index>(rows.size()), std::numeric_limits<double>::quiet_NaN());
-  for (const Part& part : prepared(stratum, ratio).parts) {
-    const std::vector<Index> where = rows_of(part, rows);
-    if (where.empty()) continue;
-    std::vector<int> asked;
-    for (const Index r : where) asked.push_back(rows[static_cast<std::size_t>(r)]);
-    // L_row (LᵀV⁻¹L)⁻¹ L_rowᵀ with LᵀV⁻¹L = P RᵀR Pᵀ
-    const Index rank = part.basis.cols();
-    const MatrixXd r = part.qr.matrixQR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
-    const MatrixXd permuted = (baseline_of(asked, part.groups) * part.qr.colsPermutation()).leftCols(rank);
-    const MatrixXd half = r.transpose().triangularView<Eigen::Lower>().solve(permuted.transpose());
-    result(where) = half.colwise().squaredNorm().transpose();
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(static_cast<Index>(rows.size()));
+  if (!strata_[stratum].means()) return result;
+  std::map<int, MatrixXd> covariance;  // the group's block of (LᵀV⁻¹L)⁻¹
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const auto group = groups_.find(observations_.group[static_cast<std::size_t>(rows[r])]);
+    double& variance = result(static_cast<Index>(r));
+    if (group == groups_.end()) {
+      variance = std::numeric_limits<double>::quiet_NaN();
+      continue;
+    }
+    const auto [known, fresh] = covariance.try_emplace(group->first);
+    if (fresh) {
+      MatrixXd half = MatrixXd::Zero(columns_, own_.cols());
+      half.middleRows(group->second.first, own_.cols()).setIdentity();
+      prepared(stratum, ratio).normal.matrixL().solveInPlace(half);
+      known->second = half.transpose() * half;
+    }
+    const Eigen::RowVectorXd row = baseline_row(group->second, rows[r]);
+    variance = row.dot(row * known->second);
   }
   return result;
 }

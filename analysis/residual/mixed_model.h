@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <map>
 #include <random>
+#include <set>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -85,41 +86,45 @@ class MixedModel {
   const Eigen::MatrixXd& mode_matrix() const { return modes_; }
 
  private:
-  /// The baseline of some runs, whitened and decomposed: of one group, or of all where sessions tie them
-  /// together.
-  struct Part {
-    std::vector<Eigen::Index> runs;                  // positions in rows_
-    std::vector<int> groups;                         // column block of each
-    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;  // of the whitened baseline
-    Eigen::MatrixXd basis;                           // orthonormal
+  /// A constant and the slopes of one group's runs, as orthonormal columns: [1 slopes] · to_orthonormal,
+  /// whose last columns are 0 where slopes are collinear with the constant.
+  struct GroupBaseline {
+    Eigen::Index first = 0;  // of its columns in the whole baseline
+    Eigen::MatrixXd to_orthonormal;
   };
+  /// L of the whole baseline in one stratum of runs' means, at one ratio.
   struct Prepared {
-    std::vector<Part> parts;
-    double log_xvx = 0;  // log|LᵀV⁻¹L|
+    Eigen::LLT<Eigen::MatrixXd> normal;  // LᵀV⁻¹L; 1 on the diagonal where a column is 0
+    double log_xvx = 0;                  // its log determinant, before columns were made orthonormal
   };
 
   MixedModel(const Observations& observations, std::vector<int> rows, const std::vector<std::size_t>& ratio,
              const std::array<double, 2>& run_correlation);
+  void set_groups();
+  /// At the ratios that are wanted.
+  std::vector<Prepared> prepare(double run_correlation, const std::set<std::size_t>& ratio) const;
   /// Of a stratum of runs' means: their baseline.
   const Prepared& prepared(std::size_t stratum, std::size_t ratio) const;
   double make_log_determinant(std::size_t stratum, std::size_t ratio) const;
-  Prepared prepare(std::size_t ratio, double run_correlation);
-  Part decompose(std::size_t ratio, double run_correlation, std::vector<Eigen::Index> runs,
-                 std::vector<int> groups) const;
-  /// Baseline columns of runs: a constant and the slopes for each of `groups`; NaN where the group is not
-  /// among them.
-  Eigen::MatrixXd baseline_of(const std::vector<int>& rows, const std::vector<int>& groups) const;
-  /// Rows of `rows` that a part speaks for.
-  std::vector<Eigen::Index> rows_of(const Part& part, const std::vector<int>& rows) const;
+  /// A run's few values in the columns of its group.
+  Eigen::RowVectorXd baseline_row(const GroupBaseline& group, int row) const;
+  /// (LᵀV⁻¹L)⁻¹ LᵀV⁻¹ columns, of whitened columns of the model's runs.
+  Eigen::MatrixXd baseline_coefficients(std::size_t stratum, std::size_t ratio,
+                                        Eigen::MatrixXd whitened) const;
 
   const Observations& observations_;
   std::vector<int> rows_;
   std::vector<std::vector<Eigen::Index>> blocks_;  // runs of each block, as positions in rows_
+  std::map<int, GroupBaseline> groups_;
+  Eigen::Index columns_ = 0, baseline_columns_ = 0;  // of L; those that are not 0
+  double log_of_groups_ = 0;                         // Σ log|LᵀL| of the groups as they were
+  /// L is sparse: of each run, the first of its columns and what stands in them.
+  std::vector<Eigen::Index> first_column_;
+  Eigen::MatrixXd own_;
   Eigen::MatrixXd modes_;
   std::vector<Stratum> strata_;
   std::size_t ratios_ = kRatios.size();
   std::array<double, 2> run_correlation_ = {0, 0};
-  Eigen::Index baseline_columns_ = 0;
   /// By ratio; of the rotors' differences only where their runs are correlated otherwise than the means.
   std::array<std::vector<Prepared>, 2> prepared_;
   std::vector<std::vector<double>> log_determinant_;  // stratum, ratio

@@ -53,6 +53,7 @@ struct Observations {
   std::vector<bool> held_out;  // a table's hold_out expression; empty: seal blocks instead
   bool from_table = false, blocks_are_rows = false;
   bool coefficient = false;  // the response is a thrust coefficient, or is made one by its measured speed
+  bool bare_thrust = false;  // it is a thrust, and the baseline does not have the density of the air
   bool groups_within_blocks =
       false;  // the block is the group: its baseline is estimated anew where it is held out
   /// Of the scatter of neighbouring runs of a block: what rotors have in common, what they differ by. Not

@@ -102,6 +102,7 @@ void set_response(const Source& source, const ObservationChoice& choice, Observa
   // C_T is what is constant where speed and diameter are known; a baseline in another column replaces that.
   const bool reduced = own && column.meaning == "thrust_N" && choice.baseline.empty() && schema.speed_column;
   result.coefficient = result.coefficient || reduced;
+  result.bare_thrust = own && column.meaning == "thrust_N" && !reduced;
   for (Index r = 0; r < source.count(); ++r) {
     const Observation& row = source.row(r);
     result.value(r, 0) = source.converted(r, column);

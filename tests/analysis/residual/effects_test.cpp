@@ -89,12 +89,12 @@ TEST(Effects, AreExactlyTheNamesOfTheList) {
   for (const Effect& effect : all_effects()) names.insert(effect.name);
   EXPECT_THAT(names,
               testing::UnorderedElementsAre(
-                  "air_pressure", "air_humidity", "rotor_speed", "reynolds_number", "tip_mach",
-                  "supply_voltage", "motor_warm_up", "wake_recirculation", "axial_wind", "ground_effect",
-                  "ceiling_effect", "wall_effect", "blade_flex", "zero_drift_temperature", "zero_drift_time",
-                  "span_drift_temperature", "temperature_gradient", "excitation_voltage", "reference_drift",
-                  "creep", "creep_recovery", "hysteresis", "nonlinearity", "bidirectional", "crosstalk",
-                  "axis_tilt", "cable_force", "mounting_step", "propeller_step", "mains_pickup",
+                  "air_pressure", "air_temperature", "air_humidity", "rotor_speed", "reynolds_number",
+                  "tip_mach", "supply_voltage", "motor_warm_up", "wake_recirculation", "axial_wind",
+                  "ground_effect", "ceiling_effect", "wall_effect", "blade_flex", "zero_drift_temperature",
+                  "zero_drift_time", "span_drift_temperature", "temperature_gradient", "excitation_voltage",
+                  "reference_drift", "creep", "creep_recovery", "hysteresis", "nonlinearity", "bidirectional",
+                  "crosstalk", "axis_tilt", "cable_force", "mounting_step", "propeller_step", "mains_pickup",
                   "vibration_alias", "structural_resonance", "adc_clipping", "clock_lag"));
 }
 

@@ -191,6 +191,31 @@ TEST_F(TablesTest, AConditionThatNeverChangesIsWarnedOf) {
                           [](const Untestable& u) { return u.effect == "air_humidity"; }));
 }
 
+/// Thrust at a fixed speed on days of other weather: nothing but the air's density changes.
+TEST_F(TablesTest, ThrustInWeatherIsTheAirsDensity) {
+  std::string csv = "day,p,T,y\n";
+  for (int day = 0; day < 16; ++day) {
+    const double p_hPa = 990 + 40 * even(random), T_C = 5 + 25 * even(random);
+    for (int r = 0; r < 6; ++r) {
+      const double here_C = T_C + even(random), thrust_N = 7 * p_hPa / 1010 * 288 / (here_C + 273.15);
+      csv += fmt::format("{},{},{},{}\n", day, p_hPa, here_C, thrust_N * (1 + 0.002 * scatter(random)));
+    }
+  }
+  const Explanation e = explained(
+      observed(csv,
+               "blocks = \"day\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+               "[[covariates]]\ncolumn = \"p\"\nunit = \"hPa\"\nmeaning = \"air_pressure_Pa\"\n"
+               "[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\nmeaning = \"air_temperature_C\"\n"));
+  ASSERT_EQ(e.adopted.size(), 2u) << names(e);
+  for (const AdoptedEffect& adopted : e.adopted) {
+    std::vector<std::string> set = adopted.confounded_with;
+    set.push_back(adopted.term.effect->name);
+    EXPECT_TRUE(std::count(set.begin(), set.end(), "air_pressure") +
+                std::count(set.begin(), set.end(), "air_temperature"))
+        << names(e);
+  }
+}
+
 /// A cell that is pulled reads below zero; what its zero does is added all the same.
 TEST_F(TablesTest, EffectsAreAddedToNegativeResponsesWithTheirSign) {
   std::string csv = "g,b,T,u\n";
