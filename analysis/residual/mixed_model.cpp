@@ -301,9 +301,13 @@ Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t r
     }
     const auto [known, fresh] = covariance.try_emplace(group->first);
     if (fresh) {
-      MatrixXd half = MatrixXd::Zero(columns_, own_.cols());
-      half.middleRows(group->second.first, own_.cols()).setIdentity();
-      prepared(stratum, ratio).normal.matrixL().solveInPlace(half);
+      const Index below = columns_ - group->second.first;  // above them the solution is 0
+      MatrixXd half = MatrixXd::Identity(below, own_.cols());
+      prepared(stratum, ratio)
+          .normal.matrixLLT()
+          .bottomRightCorner(below, below)
+          .triangularView<Eigen::Lower>()
+          .solveInPlace(half);
       known->second = half.transpose() * half;
     }
     const Eigen::RowVectorXd row = baseline_row(group->second, rows[r]);

@@ -76,8 +76,11 @@ class Search {
   void swap_weaker();
   double evidence_of(const Scan& scan, const Term& term) const;
   JointFit fit_without(std::size_t t) const;
-  /// An effect of typical shape, at the size that passes α four times in five.
+  /// What each effect must be to pass α four times in five.
   void set_detectable(const Scan& scan);
+  /// rms of a candidate whose evidence is just enough: the variance that it adds counts against it, where
+  /// sessions are few.
+  double critical_rms(const Candidate& candidate, double amplitude, double error) const;
   double rms_of(const Eigen::MatrixXd& column) const;
 
   // structure without a name: search_curves.cpp

@@ -298,22 +298,37 @@ JointFit Search::fit_without(std::size_t t) const {
 /// Of what varies from session to session far more is needed than of what varies from run to run: so effect
 /// by effect, and the largest for all.
 void Search::set_detectable(const Scan& scan) {
-  std::map<std::string, std::vector<double>> errors;  // rms of one standard error, of each way to try
+  std::map<std::string, std::vector<std::pair<double, std::size_t>>> errors;  // rms of one; of each way
   for (std::size_t i = 0; i < scan.candidates.size(); ++i) {
-    if (scan.fits[i].likelihood_ratio <= 0) continue;
     const double z = std::sqrt(2 * scan.fits[i].likelihood_ratio);
     const double size = std::abs(scan.fits[i].amplitude(0)) * rms_of(scan.candidates[i].columns[0][0]);
-    if (size > 0) errors[scan.ways[i].effect->name].push_back(size / z);
+    if (z > 0 && size > 0) errors[scan.ways[i].effect->name].emplace_back(size / z, i);
   }
   if (errors.empty()) return;
   result_.detectable_sigma = 0;
-  for (auto& [name, rms] : errors) {
-    const auto middle = rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2);
-    std::nth_element(rms.begin(), middle, rms.end());
-    const double needed = deviates(critical_) * *middle;
+  for (auto& [name, ways] : errors) {
+    std::sort(ways.begin(), ways.end());
+    const auto [error, i] = ways[ways.size() / 2];
+    constexpr double kFourTimesInFive = 0.84;
+    const double needed =
+        critical_rms(scan.candidates[i], scan.fits[i].amplitude(0), error) + kFourTimesInFive * error;
     result_.detectable_by_effect[name] = needed;
     result_.detectable_sigma = std::max(result_.detectable_sigma, needed);
   }
+}
+
+double Search::critical_rms(const Candidate& candidate, double amplitude, double error) const {
+  const CandidateScan alone(*mixed_, {}, {candidate});
+  const double unit = (candidate.sign < 0 ? -1 : 1) / rms_of(candidate.columns[0][0]);
+  double low = 0, high = 100 * error;
+  while (high - low > 0.1 * error) {
+    const double middle = (low + high) / 2;
+    Components planted = y_;  // in place of what is there already
+    for (std::size_t k = 0; k < planted.size(); ++k)
+      planted[k] += (middle * unit - amplitude) * candidate.columns[0][k];
+    (alone.fit(planted)[0].evidence < critical_ ? low : high) = middle;
+  }
+  return high;
 }
 
 double Search::rms_of(const Eigen::MatrixXd& column) const {
