@@ -167,46 +167,53 @@ Eigen::RowVectorXd MixedModel::baseline_row(const GroupBaseline& group, int row)
   return plain * group.to_orthonormal;
 }
 
-std::vector<MixedModel::Prepared> MixedModel::prepare(double run_correlation,
-                                                      const std::set<std::size_t>& ratio) const {
-  // V⁻¹ = AᵀA − Σ a/(1 + a wᵀw) Aᵀw wᵀA, a block's A L having two runs in a row at most.
+MixedModel::NormalParts MixedModel::normal_parts(double run_correlation) const {
   const Root root(blocks_, 0, run_correlation);
   const Index each = own_.cols();
-  MatrixXd independent = MatrixXd::Zero(columns_, columns_);
-  MatrixXd sessions = MatrixXd::Zero(columns_, static_cast<Index>(blocks_.size()));
+  NormalParts parts{MatrixXd::Zero(columns_, columns_),
+                    MatrixXd::Zero(columns_, static_cast<Index>(blocks_.size()))};
+  struct Entry {
+    Index first;
+    Eigen::RowVectorXd values;
+  };
   for (std::size_t b = 0; b < blocks_.size(); ++b)
     for (std::size_t k = 0; k < blocks_[b].size(); ++k) {
-      struct Part {
-        Index first;
-        Eigen::RowVectorXd values;
-      };
-      std::vector<Part> row;
+      std::vector<Entry> row;  // of A L: a run less a part of the one before it
       const auto add = [&](Index run, double weight) {
         row.push_back({first_column_[static_cast<std::size_t>(run)], weight * own_.row(run)});
       };
       add(blocks_[b][k], k == 0 ? 1 : root.scale());
       if (k > 0 && run_correlation != 0) add(blocks_[b][k - 1], -run_correlation * root.scale());
-      for (const Part& one : row) {
-        sessions.col(static_cast<Index>(b)).segment(one.first, each) +=
+      for (const Entry& one : row) {
+        parts.of_blocks.col(static_cast<Index>(b)).segment(one.first, each) +=
             (k == 0 ? 1 : root.later()) * one.values.transpose();
-        for (const Part& other : row)
-          independent.block(one.first, other.first, each, each) += one.values.transpose() * other.values;
+        for (const Entry& other : row)
+          parts.independent.block(one.first, other.first, each, each) +=
+              one.values.transpose() * other.values;
       }
     }
+  return parts;
+}
+
+std::vector<MixedModel::Prepared> MixedModel::prepare(double run_correlation,
+                                                      const std::set<std::size_t>& ratio) const {
   std::vector<Prepared> result(ratios_);
+  std::optional<NormalParts> parts;
   for (const std::size_t r : ratio) {
-    MatrixXd normal = independent;
-    if (kRatios[r] > 0) {
-      Eigen::VectorXd weight(sessions.cols());
-      for (std::size_t b = 0; b < blocks_.size(); ++b)
-        weight(static_cast<Index>(b)) = std::sqrt(kRatios[r] / (1 + kRatios[r] * root.squared_norm(b)));
-      normal.selfadjointView<Eigen::Lower>().rankUpdate(sessions * weight.asDiagonal(), -1);
-    }
+    result[r].log_xvx = log_of_groups_;
+    if (kRatios[r] == 0 && run_correlation == 0) continue;
+    if (!parts) parts = normal_parts(run_correlation);
+    const Root root(blocks_, kRatios[r], run_correlation);
+    Eigen::VectorXd weight(parts->of_blocks.cols());
+    for (std::size_t b = 0; b < blocks_.size(); ++b)
+      weight(static_cast<Index>(b)) = std::sqrt(kRatios[r] / (1 + kRatios[r] * root.squared_norm(b)));
+    MatrixXd normal = parts->independent;
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(parts->of_blocks * weight.asDiagonal(), -1);
     for (const auto& [number, group] : groups_)
-      for (Index k = 0; k < each; ++k)
+      for (Index k = 0; k < own_.cols(); ++k)
         if (group.to_orthonormal.col(k).isZero(0)) normal(group.first + k, group.first + k) = 1;
-    result[r].normal.compute(normal);
-    result[r].log_xvx = log_of_groups_ + 2 * result[r].normal.matrixLLT().diagonal().array().log().sum();
+    result[r].normal.emplace(normal);
+    result[r].log_xvx += 2 * result[r].normal->matrixLLT().diagonal().array().log().sum();
   }
   return result;
 }
@@ -218,7 +225,7 @@ MatrixXd MixedModel::baseline_coefficients(std::size_t stratum, std::size_t rati
     for (Index k = 0; k < own_.cols(); ++k)
       for (Index run = 0; run < whitened.rows(); ++run)
         result(first_column_[static_cast<std::size_t>(run)] + k, c) += own_(run, k) * whitened(run, c);
-  prepared(stratum, ratio).normal.solveInPlace(result);
+  if (const auto& normal = prepared(stratum, ratio).normal) normal->solveInPlace(result);
   return result;
 }
 
@@ -291,6 +298,7 @@ Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t r
                                               const std::vector<int>& rows) const {
   Eigen::VectorXd result = Eigen::VectorXd::Zero(static_cast<Index>(rows.size()));
   if (!strata_[stratum].means()) return result;
+  const auto& normal = prepared(stratum, ratio).normal;
   std::map<int, MatrixXd> covariance;  // the group's block of (LᵀV⁻¹L)⁻¹
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const auto group = groups_.find(observations_.group[static_cast<std::size_t>(rows[r])]);
@@ -300,14 +308,12 @@ Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t r
       continue;
     }
     const auto [known, fresh] = covariance.try_emplace(group->first);
-    if (fresh) {
+    if (fresh && !normal) {
+      known->second.setIdentity(own_.cols(), own_.cols());
+    } else if (fresh) {
       const Index below = columns_ - group->second.first;  // above them the solution is 0
       MatrixXd half = MatrixXd::Identity(below, own_.cols());
-      prepared(stratum, ratio)
-          .normal.matrixLLT()
-          .bottomRightCorner(below, below)
-          .triangularView<Eigen::Lower>()
-          .solveInPlace(half);
+      normal->matrixLLT().bottomRightCorner(below, below).triangularView<Eigen::Lower>().solveInPlace(half);
       known->second = half.transpose() * half;
     }
     const Eigen::RowVectorXd row = baseline_row(group->second, rows[r]);

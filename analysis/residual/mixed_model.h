@@ -13,6 +13,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <random>
 #include <set>
 #include <vector>
@@ -94,13 +95,20 @@ class MixedModel {
   };
   /// L of the whole baseline in one stratum of runs' means, at one ratio.
   struct Prepared {
-    Eigen::LLT<Eigen::MatrixXd> normal;  // LᵀV⁻¹L; 1 on the diagonal where a column is 0
-    double log_xvx = 0;                  // its log determinant, before columns were made orthonormal
+    /// LᵀV⁻¹L, 1 on the diagonal where a column is 0; nothing where V is 1, and so LᵀL.
+    std::optional<Eigen::LLT<Eigen::MatrixXd>> normal;
+    double log_xvx = 0;  // its log determinant, before columns were made orthonormal
   };
 
   MixedModel(const Observations& observations, std::vector<int> rows, const std::vector<std::size_t>& ratio,
              const std::array<double, 2>& run_correlation);
   void set_groups();
+  /// LᵀV⁻¹L = independent − Σ a/(1 + a wᵀw) s sᵀ over the blocks' columns s, since with the root's A and w
+  /// V⁻¹ = AᵀA − Σ a/(1 + a wᵀw) Aᵀw wᵀA.
+  struct NormalParts {
+    Eigen::MatrixXd independent, of_blocks;
+  };
+  NormalParts normal_parts(double run_correlation) const;
   /// At the ratios that are wanted.
   std::vector<Prepared> prepare(double run_correlation, const std::set<std::size_t>& ratio) const;
   /// Of a stratum of runs' means: their baseline.

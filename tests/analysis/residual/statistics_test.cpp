@@ -41,12 +41,25 @@ struct Statistics : testing::Test {
   static std::vector<Candidate> candidates_of(const Observations& o) {
     const auto rows = o.all_rows();
     const MatrixXd predicted = predict_response(o, {}, rows);
+    const MixedModel baseline = MixedModel::baseline_alone(o, rows);
     std::vector<Candidate> candidates;
     for (const Term& way : all_ways(test::every_effect(), o, rows)) {
-      const TermResponse response = respond(way, o, predicted);
-      if (response.derivative[0][0].norm() > 0) candidates.push_back({.columns = {response.derivative[0]}});
+      const Components column = respond(way, o, predicted).derivative[0];
+      if (is_seen(baseline, column)) candidates.push_back({.columns = {column}});
     }
     return candidates;
+  }
+
+  /// Of what the groups' constants absorb only rounding is left.
+  static bool is_seen(const MixedModel& baseline, const Components& column) {
+    double before = 0, after = 0;
+    for (std::size_t s = 0; s < baseline.strata().size(); ++s) {
+      Stacked stacked = baseline.stack(s, {&column});
+      before += stacked.squaredNorm();
+      baseline.project(s, 0, stacked);
+      after += stacked.squaredNorm();
+    }
+    return after > 1e-14 * before && after > 0;
   }
 };
 
