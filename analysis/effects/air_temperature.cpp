@@ -1,4 +1,5 @@
 // Warm air is thin. A campaign's baseline has the density at the air's temperature; a table's thrust has not.
+#include "analysis/air.h"
 #include "analysis/effects/effect.h"
 
 #include <cmath>
@@ -6,13 +7,11 @@
 namespace tunnelrig::effects {
 namespace {
 
-constexpr double kZero_K = 273.15;
-
 struct AirTemperature {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
     using std::pow;
-    return force * pow(T((s.reference[0] + kZero_K) / (s.x[0] + kZero_K)), p[0]);
+    return force * pow(T((s.reference[0] + kZeroCelsius_K) / (s.x[0] + kZeroCelsius_K)), p[0]);
   }
 };
 

@@ -31,21 +31,9 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
     if (can.ok()) {
       const std::vector<Term> ways = ways_to_try(*effect, observations, rows);
       if (ways.empty()) reason = "there are too few blocks on both sides of any step";
-      bool seen = false;
-      for (const Term& way : ways) {
-        const TermResponse response = respond(way, observations, predicted);
-        double before = 0, after = 0;
-        for (std::size_t s = 0; s < mixed.strata().size(); ++s) {
-          Stacked column = mixed.stack(s, {&response.derivative[0]});
-          before += column.squaredNorm();
-          mixed.project(s, 0, column);
-          after += column.squaredNorm();
-        }
-        if (after > 1e-14 * before && after > 0) {
-          seen = true;
-          break;
-        }
-      }
+      const bool seen = std::any_of(ways.begin(), ways.end(), [&](const Term& way) {
+        return mixed.sees(respond(way, observations, predicted).derivative[0]);
+      });
       if (!seen && reason.empty())
         reason = "it does not vary within any location, so the location's coefficient absorbs it";
       if (seen) {

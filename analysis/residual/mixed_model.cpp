@@ -273,6 +273,17 @@ void MixedModel::project(std::size_t stratum, std::size_t ratio, Stacked& column
   root.apply(by_mode);
 }
 
+bool MixedModel::sees(const Components& column) const {
+  double before = 0, after = 0;
+  for (std::size_t s = 0; s < strata_.size(); ++s) {
+    Stacked stacked = stack(s, {&column});
+    before += stacked.squaredNorm();
+    project(s, 0, stacked);
+    after += stacked.squaredNorm();
+  }
+  return after > 1e-14 * before && after > 0;
+}
+
 Stacked MixedModel::baseline_prediction(std::size_t stratum, std::size_t ratio, const Stacked& columns,
                                         const std::vector<int>& rows) const {
   const Index n = static_cast<Index>(rows_.size()), wanted = static_cast<Index>(rows.size());

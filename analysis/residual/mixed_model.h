@@ -67,6 +67,9 @@ class MixedModel {
   /// Whitens with the ratio and takes out what the baseline can absorb, in place.
   void project(std::size_t stratum, std::size_t ratio, Stacked& columns) const;
 
+  /// Whether more than rounding is left of a column without what the baseline can absorb.
+  bool sees(const Components& column) const;
+
   /// What the baseline, fitted to stacked columns of the model's runs, predicts for other runs (stacked
   /// likewise, not whitened). Rows whose group the model does not hold are NaN. Courses have no baseline:
   /// zero.

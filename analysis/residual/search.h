@@ -46,8 +46,6 @@ class Search {
   /// All candidates on top of a model.
   Scan scan_effects(const JointFit& base) const;
   Candidate candidate_of(const Term& way, const Eigen::MatrixXd& predicted) const;
-  /// What groups' constants absorb cannot be tested.
-  bool can_be_seen(const Candidate& candidate) const;
   void rank(const JointFit& base, Scan& scan) const;
   bool add_best_effect();
   std::vector<Ranked> ranking(const Scan& scan, NullMaxima& maxima) const;

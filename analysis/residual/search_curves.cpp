@@ -40,7 +40,7 @@ Search::CurveScan Search::scan_curves() const {
     });
     Curve curve = named ? without_trend(each, rows_) : each;
     Candidate candidate = as_candidate(curve);
-    if (!can_be_seen(candidate)) continue;
+    if (!mixed_->sees(candidate.columns[0])) continue;
     result.scan.candidates.push_back(std::move(candidate));
     result.tried.push_back(std::move(curve));
   }
@@ -112,7 +112,7 @@ void Search::doubt_formulas() {
       const Curve bend = without_trend(curve, rows_);
       Scan scan;
       scan.candidates.push_back(as_candidate(bend));
-      if (!can_be_seen(scan.candidates[0])) continue;
+      if (!mixed_->sees(scan.candidates[0].columns[0])) continue;
       rank(fit_, scan);
       const double p =
           NullMaxima(*scan.scan, fit_.variances, settings_, 2000 + ++salt_).p(scan.fits[0].evidence);

@@ -58,7 +58,7 @@ Search::Scan Search::scan_effects(const JointFit& base) const {
   for (const Term& way : ways_) {
     if (already_in(way) || is_work_of_a_curve(way)) continue;
     Candidate candidate = candidate_of(way, predicted);
-    if (!can_be_seen(candidate)) continue;
+    if (!mixed_->sees(candidate.columns[0])) continue;
     scan.ways.push_back(way);
     scan.candidates.push_back(std::move(candidate));
   }
@@ -74,17 +74,6 @@ Candidate Search::candidate_of(const Term& way, const Eigen::MatrixXd& predicted
                   : amplitude.upper <= 0 ? -1
                                          : 0,
           .weight = prior_weight(way, points)};
-}
-
-bool Search::can_be_seen(const Candidate& candidate) const {
-  double before = 0, after = 0;
-  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
-    Stacked column = mixed_->stack(s, {&candidate.columns[0]});
-    before += column.squaredNorm();
-    mixed_->project(s, 0, column);
-    after += column.squaredNorm();
-  }
-  return after > 1e-14 * before && after > 0;
 }
 
 void Search::rank(const JointFit& base, Scan& scan) const {

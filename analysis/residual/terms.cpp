@@ -217,13 +217,12 @@ Testability testability(const Effect& effect, const Observations& observations) 
     if (const auto why = observations.not_usable.find(name); why != observations.not_usable.end())
       result.reason = name + " is " + why->second;
   }
-  if (effect.name == "air_temperature" && observations.assumed.contains("air_temperature_C"))
+  // With the standard's air nothing changes, and a gradient is the drift of zero by another name.
+  if ((effect.name == "air_temperature" || effect.name == "temperature_gradient") &&
+      observations.assumed.contains("air_temperature_C"))
     result.missing.emplace_back("air_temperature_C");
   else if (effect.name == "air_temperature" && !observations.bare_thrust)
     result.reason = "only a table's thrust is held against a baseline without the density of its air";
-  // With the standard's air it is the drift of zero with temperature by another name.
-  if (effect.name == "temperature_gradient" && observations.assumed.contains("air_temperature_C"))
-    result.missing.emplace_back("air_temperature_C");
   if (effect.scope == EffectScope::kPair && observations.channels() < 2)
     result.reason = "the response has one channel";
   if (effect.tunnel_only &&

@@ -45,21 +45,9 @@ struct Statistics : testing::Test {
     std::vector<Candidate> candidates;
     for (const Term& way : all_ways(test::every_effect(), o, rows)) {
       const Components column = respond(way, o, predicted).derivative[0];
-      if (is_seen(baseline, column)) candidates.push_back({.columns = {column}});
+      if (baseline.sees(column)) candidates.push_back({.columns = {column}});
     }
     return candidates;
-  }
-
-  /// Of what the groups' constants absorb only rounding is left.
-  static bool is_seen(const MixedModel& baseline, const Components& column) {
-    double before = 0, after = 0;
-    for (std::size_t s = 0; s < baseline.strata().size(); ++s) {
-      Stacked stacked = baseline.stack(s, {&column});
-      before += stacked.squaredNorm();
-      baseline.project(s, 0, stacked);
-      after += stacked.squaredNorm();
-    }
-    return after > 1e-14 * before && after > 0;
   }
 };
 
@@ -103,10 +91,9 @@ TEST_F(Statistics, POfANullCampaignIsUniform) {
     const double limit =
         1.63 / std::sqrt(static_cast<double>(kCampaigns));  // 1 % of Kolmogorov's distribution
     EXPECT_LT(distance.above, limit);
-    // A session variance of 0 is estimated as 0 or more, which makes p a little too large.
-    if (session_ratio > 0) {
-      EXPECT_LT(distance.below, limit);
-    }
+    // A session variance of 0 is estimated as 0 or more, which makes p a little too large: 0.117 at most over
+    // seven seeds.
+    EXPECT_LT(distance.below, session_ratio > 0 ? limit : 0.13);
     EXPECT_LE(small, 24) << "binomial (240, 0.05): beyond 24 in 0.05 % of cases";
   }
 }
