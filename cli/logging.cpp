@@ -37,7 +37,9 @@ Logging::Logging(const LogOptions& options)
   if (file_.empty()) {
     const std::string toml =
         options.campaign.empty() ? reference_campaign_toml() : read_text(options.campaign);
-    parse_campaign_toml(toml, options.campaign.empty() ? "campaign.toml" : options.campaign);
+    const CampaignInfo info =
+        parse_campaign_toml(toml, options.campaign.empty() ? "campaign.toml" : options.campaign);
+    for (const std::string& unread : info.unread) warn(unread);
     file_.set_text("campaign.toml", toml);
     if (options.campaign.empty())
       warn("a new file, so the rig is taken to be the thesis's; --campaign FILE.toml says otherwise");

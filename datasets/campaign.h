@@ -63,6 +63,8 @@ struct CampaignInfo {
   Daq daq;
   InstrumentUncertainty uncertainty;
   std::string toml;  // the document as it was written, which export gives back
+  std::vector<std::string>
+      unread;  // sentences of tables and keys in it that nothing reads, with file and line
 };
 
 /// Parses campaign.toml. Throws InputError naming file, line and key for a missing or unknown format, a value

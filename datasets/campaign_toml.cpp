@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -5,6 +6,7 @@
 #include "datasets/campaign.h"
 #include "datasets/error.h"
 
+#include <fmt/ranges.h>
 #include <toml++/toml.h>
 
 namespace tunnelrig {
@@ -12,7 +14,8 @@ namespace {
 
 constexpr std::string_view kFormat = "tunnelrig-campaign/1";
 
-/// Typed access to one table of a document, with the file and line in every message.
+/// Typed access to one table of a document, with the file and line in every message. Remembers what was asked
+/// for.
 class Section {
  public:
   Section(const toml::table& document, std::string_view name, const std::string& file)
@@ -25,10 +28,11 @@ class Section {
   }
 
   bool exists() const { return table_ != nullptr; }
+  const std::string& name() const { return name_; }
 
   /// The number under `key`, which must lie in [lowest, highest] of `unit`; nothing where it is absent.
-  std::optional<double> number(std::string_view key, double lowest, double highest,
-                               std::string_view unit) const {
+  std::optional<double> number(std::string_view key, double lowest, double highest, std::string_view unit) {
+    known_.emplace_back(key);
     const toml::node* node = table_ != nullptr ? table_->get(key) : nullptr;
     if (node == nullptr) return {};
     const auto line = static_cast<int>(node->source().begin.line);
@@ -43,14 +47,24 @@ class Section {
     return value;
   }
 
-  double required(std::string_view key, double lowest, double highest, std::string_view unit) const {
+  double required(std::string_view key, double lowest, double highest, std::string_view unit) {
     if (const auto value = number(key, lowest, highest, unit)) return *value;
     throw InputError::at(file_, line_, "{}.{} [{}] is required", name_, key, unit);
+  }
+
+  /// Keys that nobody has asked for, a sentence each.
+  void tell_unread(std::vector<std::string>& unread) const {
+    if (table_ == nullptr) return;
+    for (const auto& [key, value] : *table_)
+      if (std::find(known_.begin(), known_.end(), key.str()) == known_.end())
+        unread.push_back(fmt::format("{}:{}: nothing reads {}.{}; known are {}", file_,
+                                     key.source().begin.line, name_, key.str(), fmt::join(known_, ", ")));
   }
 
  private:
   const toml::table* table_ = nullptr;
   std::string name_;
+  std::vector<std::string> known_;
   const std::string& file_;
   int line_ = 1;
 };
@@ -63,7 +77,7 @@ toml::table parse_document(const std::string& text, const std::string& file) {
   }
 }
 
-Rig parse_rig(const Section& section) {
+Rig parse_rig(Section& section) {
   Rig rig;
   const double rotors = section.number("rotors", 1, kMaxRotors, "rotors").value_or(kMaxRotors);
   rig.rotors = static_cast<int>(std::lround(rotors));
@@ -80,7 +94,17 @@ Rig parse_rig(const Section& section) {
   return rig;
 }
 
-Daq parse_daq(const Section& section) {
+Tunnel parse_tunnel(Section& section, const Rig& rig, const std::string& file) {
+  const Tunnel tunnel{section.required("width_m", 0.05, 1000, "m"),
+                      section.required("height_m", 0.05, 1000, "m")};
+  if (tunnel.width_m <= rig.vehicle_width_m || tunnel.height_m <= rig.vehicle_height_m) {
+    throw InputError::in(file, "the vehicle ({} × {} m) does not fit the tunnel ({} × {} m)",
+                         rig.vehicle_width_m, rig.vehicle_height_m, tunnel.width_m, tunnel.height_m);
+  }
+  return tunnel;
+}
+
+Daq parse_daq(Section& section) {
   Daq daq;
   daq.sample_rate_hz = section.number("sample_rate_hz", 1, 1e6, "Hz").value_or(daq.sample_rate_hz);
   daq.adc_bits =
@@ -88,6 +112,23 @@ Daq parse_daq(const Section& section) {
   daq.adc_reference_V = section.number("adc_reference_V", 0.01, 100, "V").value_or(daq.adc_reference_V);
   daq.mains_hz = section.number("mains_hz", 1, 1000, "Hz").value_or(daq.mains_hz);
   return daq;
+}
+
+/// Tables and keys of tables that nothing reads; keys outside of tables are free text about the campaign.
+std::vector<std::string> unread_keys(const toml::table& document,
+                                     std::initializer_list<const Section*> sections,
+                                     const std::string& file) {
+  std::vector<std::string> unread;
+  for (const auto& [name, node] : document) {
+    if (!node.is_table()) continue;
+    const auto section = std::find_if(sections.begin(), sections.end(),
+                                      [&](const Section* s) { return s->name() == name.str(); });
+    if (section != sections.end())
+      (*section)->tell_unread(unread);
+    else
+      unread.push_back(fmt::format("{}:{}: nothing reads [{}]", file, name.source().begin.line, name.str()));
+  }
+  return unread;
 }
 
 }  // namespace
@@ -106,26 +147,17 @@ CampaignInfo parse_campaign_toml(const std::string& text, const std::string& fil
   CampaignInfo info;
   info.toml = text;
   info.name = document["name"].value<std::string>().value_or("");
-  const Section rig(document, "rig", file);
+  Section rig(document, "rig", file), tunnel(document, "tunnel", file), daq(document, "daq", file),
+      uncertainty(document, "uncertainty", file);
   if (!rig.exists()) throw InputError::at(file, 1, "the table [rig] is required");
   info.rig = parse_rig(rig);
-  const Section tunnel(document, "tunnel", file);
-  if (tunnel.exists()) {
-    info.tunnel =
-        Tunnel{tunnel.required("width_m", 0.05, 1000, "m"), tunnel.required("height_m", 0.05, 1000, "m")};
-    if (info.tunnel->width_m <= info.rig.vehicle_width_m ||
-        info.tunnel->height_m <= info.rig.vehicle_height_m) {
-      throw InputError::in(file, "the vehicle ({} × {} m) does not fit the tunnel ({} × {} m)",
-                           info.rig.vehicle_width_m, info.rig.vehicle_height_m, info.tunnel->width_m,
-                           info.tunnel->height_m);
-    }
-  }
-  info.daq = parse_daq(Section(document, "daq", file));
-  const Section uncertainty(document, "uncertainty", file);
+  if (tunnel.exists()) info.tunnel = parse_tunnel(tunnel, info.rig, file);
+  info.daq = parse_daq(daq);
   info.uncertainty = {.speed_rpm = uncertainty.number("speed_rpm", 0, 10000, "rev/min"),
                       .air_temperature_K = uncertainty.number("air_temperature_K", 0, 100, "K"),
                       .air_pressure_Pa = uncertainty.number("air_pressure_Pa", 0, 50000, "Pa"),
                       .force_N = uncertainty.number("force_N", 0, 1000, "N")};
+  info.unread = unread_keys(document, {&rig, &tunnel, &daq, &uncertainty}, file);
   return info;
 }
 

@@ -8,44 +8,11 @@
 #include <numbers>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <toml++/toml.h>
 
 namespace tunnelrig {
 namespace {
 
 using Doubts = std::vector<std::string>;
-
-/// What campaign_toml.cpp reads.
-const std::map<std::string_view, std::vector<std::string_view>>& known_keys() {
-  static const std::map<std::string_view, std::vector<std::string_view>> keys = {
-      {"rig",
-       {"rotors", "propeller_radius_m", "rotor_area_m2", "nominal_speed_rpm", "arm_length_m",
-        "vehicle_width_m", "vehicle_height_m", "blades", "cell_limit_N", "blade_chord_m"}},
-      {"tunnel", {"width_m", "height_m"}},
-      {"daq", {"sample_rate_hz", "adc_bits", "adc_reference_V", "mains_hz"}},
-      {"uncertainty", {"speed_rpm", "air_temperature_K", "air_pressure_Pa", "force_N"}}};
-  return keys;
-}
-
-void doubt_keys(const std::string& text, Doubts& doubts) {
-  const toml::table document = toml::parse(text);
-  for (const auto& [name, node] : document) {
-    const toml::table* table = node.as_table();
-    if (table == nullptr) continue;  // free text about the campaign is welcome
-    const auto known = known_keys().find(name.str());
-    if (known == known_keys().end()) {
-      doubts.push_back(
-          fmt::format("campaign.toml:{}: nothing reads [{}]", name.source().begin.line, name.str()));
-      continue;
-    }
-    const auto& keys = known->second;
-    for (const auto& [key, value] : *table)
-      if (std::find(keys.begin(), keys.end(), key.str()) == keys.end())
-        doubts.push_back(fmt::format("campaign.toml:{}: nothing reads {}.{}; known are {}",
-                                     key.source().begin.line, name.str(), key.str(), fmt::join(keys, ", ")));
-  }
-}
 
 /// A column that is a label because of a few cells.
 void doubt_labels(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doubts) {
@@ -60,8 +27,7 @@ void doubt_labels(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doub
   for (const auto& [column, count] : texts)
     if (numbers[column] >= kNumbersPerText * count)
       doubts.push_back(fmt::format(
-          "{}: '{}' is no number, as {} other cells are: the column is kept as text and is no condition of "
-          "the runs",
+          "{}: '{}' is no number, as {} other cells are: the whole column is kept as text",
           sheet.where(first.at(column), column), sheet.text(first.at(column), column), numbers[column]));
 }
 
@@ -105,8 +71,7 @@ void doubt_places(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doub
 
 std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& runs_sheet,
                                        const std::vector<Run>& runs) {
-  Doubts doubts;
-  doubt_keys(info.toml, doubts);
+  Doubts doubts = info.unread;
   doubt_labels(runs_sheet, runs, doubts);
   doubt_thrusts(info, runs_sheet, runs, doubts);
   doubt_places(runs_sheet, runs, doubts);

@@ -41,7 +41,9 @@ ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Obse
                     .low = curve.x.minCoeff(),
                     .high = curve.x.maxCoeff(),
                     .coefficients = {amplitude.data(), amplitude.data() + amplitude.size()},
-                    .tilt = curve.tilt};
+                    .tilt = curve.tilt,
+                    .levels = curve.levels,
+                    .labels = curve.labels};
   // The mean over the runs is the baseline's: without it the curve would shift every coefficient.
   const Covariate& covariate = *covariate_of(observations, curve);
   const Index rotor = std::max(curve.rotor, 0);

@@ -22,6 +22,7 @@ constexpr int kMostSteps = 200;
 constexpr double kConverged = 1e-12;  // relative change of the last step; the promise is 1e-10
 constexpr double kStep = 1e-4;        // of derivatives by parameters, in standard uncertainties or relative
 constexpr double kReadingStep = 1e-6;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// A location without ground or ceiling has no distance to it, and the effect is absent there.
 bool may_be_absent(const std::string& covariate) {
@@ -71,10 +72,13 @@ class Forward {
           return fmt::format("it has no {}, which the adopted effect {} needs", name, term.label());
       }
     }
-    for (std::size_t k = 0; k < model_.curves.size(); ++k)
-      if (missing(curve_covariates_[k], model_.curves[k].rotor))
-        return fmt::format("it has no {}, which the adopted {} needs", model_.curves[k].covariate,
-                           model_.curves[k].label());
+    for (std::size_t k = 0; k < model_.curves.size(); ++k) {
+      const ModelCurve& curve = model_.curves[k];
+      if (missing(curve_covariates_[k], curve.rotor))
+        return fmt::format("it has no {}, which the adopted {} needs", curve.covariate, curve.label());
+      if (curve.shape == CurveShape::kLevels && !is_level(k, row))
+        return fmt::format("its {} is none that the adopted {} knows", curve.covariate, curve.label());
+    }
     return "";
   }
 
@@ -168,12 +172,29 @@ class Forward {
     return sum / kTimes;
   }
 
+  /// What the curve is over. Texts are numbered by the curve's own list; NaN: not in it.
+  double condition(std::size_t k, Index row, Index channel) const {
+    const Covariate& covariate = *curve_covariates_[k];
+    const double x = covariate.at(row, channel);
+    const auto& known = model_.curves[k].labels;
+    if (known.empty() && covariate.labels.empty()) return x;
+    if (known.empty() || covariate.labels.empty()) return kNaN;
+    const auto found =
+        std::find(known.begin(), known.end(), covariate.labels[static_cast<std::size_t>(x) - 1]);
+    return found == known.end() ? kNaN : static_cast<double>(found - known.begin() + 1);
+  }
+
+  bool is_level(std::size_t k, Index row) const {
+    const auto& levels = model_.curves[k].levels;
+    return std::find(levels.begin(), levels.end(), condition(k, row, 0)) != levels.end();
+  }
+
   double curve_sum(Index row, Index channel, const VectorXd& parameters) const {
     double sum = 0;
     for (std::size_t k = 0; k < model_.curves.size(); ++k) {
       const ModelCurve& curve = model_.curves[k];
       if (curve.rotor >= 0 && channel != curve.rotor) continue;
-      const double x = std::clamp(curve_covariates_[k]->at(row, channel), curve.low, curve.high);
+      const double x = std::clamp(condition(k, row, channel), curve.low, curve.high);
       for (std::size_t b = 0; b < curve.coefficients.size(); ++b)
         sum += parameters(first_curve_[k] + static_cast<Index>(b)) * curve.column(b, x);
     }

@@ -79,6 +79,14 @@ class Reader {
     for (const Json& value : list(key)) values.push_back(number_of(value, key));
     return values;
   }
+  std::vector<std::string> texts(const std::string& key) const {
+    std::vector<std::string> values;
+    for (const Json& value : list(key)) {
+      if (!value.is_string()) fail("has a " + key + " that is no text");
+      values.push_back(value.get<std::string>());
+    }
+    return values;
+  }
   const std::string& where() const { return where_; }
 
  private:
@@ -120,6 +128,20 @@ ModelTerm term_of(const Reader& reader) {
   return term;
 }
 
+Json curve_json(const ModelCurve& curve) {
+  Json json{{"covariate", curve.covariate},
+            {"rotor", rotor_json(curve.rotor)},
+            {"shape", name_of(curve.shape)},
+            {"low", curve.low},
+            {"high", curve.high},
+            {"coefficients", curve.coefficients},
+            {"centre", curve.centre},
+            {"tilt", curve.tilt}};
+  if (!curve.levels.empty()) json["levels"] = curve.levels;
+  if (!curve.labels.empty()) json["labels"] = curve.labels;
+  return json;
+}
+
 /// Versions that were stored before there were other shapes do not say it.
 CurveShape shape_of(const Reader& reader) {
   if (!reader.has("shape")) return CurveShape::kWaves;
@@ -135,12 +157,16 @@ ModelCurve curve_of(const Reader& reader) {
                    .high = reader.number("high"),
                    .coefficients = reader.numbers("coefficients"),
                    .centre = reader.numbers("centre"),
-                   .tilt = reader.has("tilt") ? reader.numbers("tilt") : std::vector<double>()};
+                   .tilt = reader.has("tilt") ? reader.numbers("tilt") : std::vector<double>(),
+                   .levels = reader.has("levels") ? reader.numbers("levels") : std::vector<double>(),
+                   .labels = reader.has("labels") ? reader.texts("labels") : std::vector<std::string>()};
   if (!(curve.high > curve.low)) reader.fail("has no range: high is not above low");
   if (is_of_logarithm(curve.shape) && !(curve.low > 0))
     reader.fail("has a shape over the logarithm, and a low that is not above 0");
   if (curve.coefficients.size() != curve.centre.size())
     reader.fail("has not as many coefficients as values of centre");
+  if ((curve.shape == CurveShape::kLevels ? curve.coefficients.size() + 1 : 0) != curve.levels.size())
+    reader.fail("needs one level more than coefficients, and no levels where its shape is another");
   if (!curve.tilt.empty() && curve.tilt.size() != curve.coefficients.size())
     reader.fail("has not as many coefficients as values of tilt");
   return curve;
@@ -176,6 +202,7 @@ std::string ModelTerm::label() const {
 }
 
 double ModelCurve::column(std::size_t k, double x) const {
+  if (shape == CurveShape::kLevels) return level_column(levels, static_cast<int>(k) + 1, x) - centre[k];
   return tilted_column(shape, tilt, k, x, low, high) - centre[k];
 }
 
@@ -215,15 +242,7 @@ std::string model_json(const ModelVersion& model) {
             {"covariance", Json::array()},
             {"dof", std::isfinite(model.dof) ? Json(model.dof) : Json(nullptr)}};
   for (const ModelTerm& term : model.terms) json["terms"].push_back(term_json(term));
-  for (const ModelCurve& curve : model.curves)
-    json["curves"].push_back({{"covariate", curve.covariate},
-                              {"rotor", rotor_json(curve.rotor)},
-                              {"shape", name_of(curve.shape)},
-                              {"low", curve.low},
-                              {"high", curve.high},
-                              {"coefficients", curve.coefficients},
-                              {"centre", curve.centre},
-                              {"tilt", curve.tilt}});
+  for (const ModelCurve& curve : model.curves) json["curves"].push_back(curve_json(curve));
   for (Index i = 0; i < model.covariance.rows(); ++i) {
     Json row = Json::array();
     for (Index j = 0; j < model.covariance.cols(); ++j) row.push_back(model.covariance(i, j));

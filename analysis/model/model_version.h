@@ -27,14 +27,16 @@ struct ModelTerm {
 };
 
 /// A curve without a name: y changes by Σ a_k (column_k(x) − tilt_k s(x) − centre_k) between `low` and
-/// `high`, and is held there beyond (curve_basis.h).
+/// `high`, and is held there beyond (curve_basis.h); of levels it is known only at these.
 struct ModelCurve {
   std::string covariate;
   int rotor = -1;
   CurveShape shape = CurveShape::kWaves;
   double low = 0, high = 1;
   std::vector<double> coefficients, centre;
-  std::vector<double> tilt = {};  // empty: none
+  std::vector<double> tilt = {};         // empty: none
+  std::vector<double> levels = {};       // of CurveShape::kLevels, one more than coefficients
+  std::vector<std::string> labels = {};  // of a column of texts: x = i + 1 stands for labels[i]
 
   double column(std::size_t k, double x) const;  // of the k-th coefficient, from 0, with tilt and centre
   std::string label() const;                     // "curve over relative_humidity (empirical)"

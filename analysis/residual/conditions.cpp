@@ -51,7 +51,7 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
 
 void warn_of_constant(const Observations& observations, Explanation& explanation) {
   for (const Covariate& covariate : observations.covariates)
-    if (!covariate.derived && !observations.not_usable.contains(covariate.name) &&
+    if (!covariate.derived && covariate.labels.empty() && !observations.not_usable.contains(covariate.name) &&
         !observations.assumed.contains(covariate.name) &&
         covariate.value.maxCoeff() == covariate.value.minCoeff())
       explanation.warnings.push_back(
@@ -63,7 +63,7 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
   for (std::size_t a = 0; a < observations.covariates.size(); ++a)
     for (std::size_t b = a + 1; b < observations.covariates.size(); ++b) {
       const Covariate &first = observations.covariates[a], &second = observations.covariates[b];
-      if (first.derived && second.derived) continue;
+      if ((first.derived && second.derived) || !first.labels.empty() || !second.labels.empty()) continue;
       if (first.value.array().isNaN().any() || second.value.array().isNaN().any()) continue;
       const VectorXd u = first.value.col(0).array() - first.value.col(0).mean(),
                      v = second.value.col(0).array() - second.value.col(0).mean();

@@ -27,6 +27,10 @@ double tilted_column(CurveShape shape, const std::vector<double>& tilt, std::siz
          (tilt.empty() ? 0 : tilt[i] * curve_straight(shape, x, low, high));
 }
 
+double level_column(const std::vector<double>& levels, int k, double x) {
+  return x == levels[static_cast<std::size_t>(k)] ? 1 : 0;
+}
+
 std::string_view name_of(CurveShape shape) {
   switch (shape) {
     case CurveShape::kWaves:
@@ -37,13 +41,15 @@ std::string_view name_of(CurveShape shape) {
       return "log_parabola";
     case CurveShape::kLevelling:
       return "levelling";
+    case CurveShape::kLevels:
+      return "levels";
   }
   return "";
 }
 
 std::optional<CurveShape> curve_shape(std::string_view name) {
-  for (const CurveShape shape :
-       {CurveShape::kWaves, CurveShape::kParabola, CurveShape::kLogParabola, CurveShape::kLevelling})
+  for (const CurveShape shape : {CurveShape::kWaves, CurveShape::kParabola, CurveShape::kLogParabola,
+                                 CurveShape::kLevelling, CurveShape::kLevels})
     if (name_of(shape) == name) return shape;
   return {};
 }

@@ -12,6 +12,7 @@ enum class CurveShape {
   kParabola,     // s², s = 2u − 1: what a straight line lacks; s where it stands alone
   kLogParabola,  // the same over ln x: what a power law lacks
   kLevelling,    // low/x, with s of ln x: the same, but less and less where x grows
+  kLevels,       // 1 at one of few values: what differs from the most common of them
 };
 
 /// Whether s is that of ln x: then x is above 0.
@@ -20,14 +21,17 @@ bool is_of_logarithm(CurveShape shape);
 /// s: −1 at `low`, 1 at `high`, beyond them outside.
 double curve_straight(CurveShape shape, double x, double low, double high);
 
-/// The k-th column (from 1) at x.
+/// The k-th column (from 1) at x; not of levels.
 double curve_column(CurveShape shape, int k, double x, double low, double high);
 
 /// The same of the i-th coefficient (from 0), less what was taken out of it of s; `tilt` empty: nothing was.
 double tilted_column(CurveShape shape, const std::vector<double>& tilt, std::size_t i, double x, double low,
                      double high);
 
-/// "waves", "parabola", "log_parabola", "levelling".
+/// The k-th column (from 1) of levels: whether x is levels[k].
+double level_column(const std::vector<double>& levels, int k, double x);
+
+/// "waves", "parabola", "log_parabola", "levelling", "levels".
 std::string_view name_of(CurveShape shape);
 std::optional<CurveShape> curve_shape(std::string_view name);
 

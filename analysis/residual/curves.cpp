@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include <fmt/format.h>
@@ -15,6 +16,9 @@ using Eigen::MatrixXd;
 
 /// Few bends see a weak trend, many a wave: each covariate is tried with all of these.
 constexpr std::array<int, 3> kBends = {2, 4, 6};
+
+/// A value of few is told apart if as many blocks have it as a step needs on either side.
+constexpr std::size_t kBlocksPerLevel = 3, kMostLevels = 8;
 
 Components nothing(const Observations& observations) {
   return Components(1 + observations.shape.size(),
@@ -51,6 +55,48 @@ std::vector<CurveShape> bends_over(const Observations& observations, const Covar
                      covariate.value.minCoeff() > 0;
   if (ratio) return {CurveShape::kLogParabola, CurveShape::kLevelling};
   return {CurveShape::kParabola};
+}
+
+/// Where nearly all rows have one of few values: these, the most common first; nothing elsewhere.
+std::vector<double> levels_of(const Observations& observations, const Covariate& covariate,
+                              const std::vector<int>& rows) {
+  struct Level {
+    std::size_t rows = 0;
+    std::set<int> blocks;
+  };
+  if (covariate.derived || covariate.per_channel()) return {};
+  std::map<double, Level> all;
+  for (const int row : rows) {
+    Level& level = all[covariate.value(row, 0)];
+    ++level.rows;
+    level.blocks.insert(observations.block[static_cast<std::size_t>(row)]);
+  }
+  std::vector<double> levels;
+  std::size_t held = 0;
+  for (const auto& [value, level] : all) {
+    if (level.blocks.size() < kBlocksPerLevel) continue;
+    levels.push_back(value);
+    held += level.rows;
+  }
+  if (levels.size() < 2 || levels.size() > kMostLevels || 10 * held < 9 * rows.size()) return {};
+  std::iter_swap(levels.begin(), std::max_element(levels.begin(), levels.end(), [&](double a, double b) {
+                   return all[a].rows < all[b].rows;
+                 }));
+  return levels;
+}
+
+std::vector<Components> level_columns(const Observations& observations, const Covariate& covariate, int rotor,
+                                      const std::vector<double>& levels) {
+  std::vector<Components> columns;
+  for (std::size_t k = 1; k < levels.size(); ++k) {
+    columns.push_back(nothing(observations));
+    for (Index row = 0; row < observations.rows(); ++row)
+      for (Index channel = 0; channel < observations.channels(); ++channel)
+        if (rotor < 0 || channel == rotor)
+          columns.back()[0](row, channel) =
+              level_column(levels, static_cast<int>(k), covariate.value(row, 0));
+  }
+  return columns;
 }
 
 int different_values(const Covariate& covariate, const std::vector<int>& rows) {
@@ -101,6 +147,16 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
   for (const Covariate& covariate : observations.covariates) {
     if (observations.not_usable.contains(covariate.name) || covariate.value.array().isNaN().any()) continue;
     if (!(covariate.value.maxCoeff() > covariate.value.minCoeff())) continue;
+    if (const std::vector<double> levels = levels_of(observations, covariate, rows); !levels.empty())
+      for (const int rotor : rotors)
+        curves.push_back({.covariate = covariate.name,
+                          .rotor = rotor,
+                          .shape = CurveShape::kLevels,
+                          .columns = level_columns(observations, covariate, rotor, levels),
+                          .x = covariate.value,
+                          .levels = levels,
+                          .labels = covariate.labels});
+    if (!covariate.labels.empty()) continue;
     const int most = different_values(covariate, rows) / 3;
     const auto add = [&](CurveShape shape, int count) {
       for (const int rotor : rotors)
@@ -159,8 +215,8 @@ Curve with_trend(const Curve& curve) {
 }
 
 bool is_bend_over(const Curve& curve, const std::vector<std::string>& covariates, int rotor) {
-  return curve.columns.size() == 1 && curve.x.size() > 0 && curve.rotor == rotor &&
-         is_over(curve, covariates);
+  return curve.columns.size() == 1 && curve.shape != CurveShape::kLevels && curve.x.size() > 0 &&
+         curve.rotor == rotor && is_over(curve, covariates);
 }
 
 Candidate as_candidate(const Curve& curve) {

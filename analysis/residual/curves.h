@@ -17,14 +17,17 @@ struct Curve {
   int rotor = -1;
   CurveShape shape = CurveShape::kWaves;
   std::vector<Components> columns;
-  std::vector<double> tilt = {};  // of each column: what was taken out of it of s; empty: nothing
-  Eigen::MatrixXd x;              // n × 1 or n × c: what it is drawn against; empty for time_in_run
+  std::vector<double> tilt = {};         // of each column: what was taken out of it of s; empty: nothing
+  Eigen::MatrixXd x;                     // n × 1 or n × c: what it is drawn against; empty for time_in_run
+  std::vector<double> levels = {};       // of kLevels: the values told apart, the most common first
+  std::vector<std::string> labels = {};  // of texts: value i + 1 stands for labels[i]
 
   std::string label() const;
 };
 
-/// Curves over everything that is known of the runs: a bend beside whatever trend has a name, and waves.
-/// `rows` decide how many bends a covariate can show: one for every three different values, at most six.
+/// Curves over everything that is known of the runs: a bend beside whatever trend has a name, waves, and
+/// where there are few values (always with texts) a constant for each. `rows` decide how many bends a
+/// covariate can show: one for every three different values, at most six.
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows);
 
 /// The same without what is straight: beside a named effect of the same covariate, whose work that is.

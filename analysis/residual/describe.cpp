@@ -12,14 +12,54 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+/// Where a curve is drawn, and its columns there.
+struct Drawn {
+  double x = 0;
+  VectorXd columns;
+};
+
+std::vector<Drawn> drawn_levels(const Curve& curve) {
+  const auto k = static_cast<Index>(curve.columns.size());
+  std::vector<double> levels = curve.levels;
+  std::sort(levels.begin(), levels.end());
+  std::vector<Drawn> points;
+  for (const double x : levels) {
+    points.push_back({x, VectorXd(k)});
+    for (Index b = 0; b < k; ++b)
+      points.back().columns(b) = level_column(curve.levels, static_cast<int>(b) + 1, x);
+  }
+  // None of them stands apart: each is held against the mean of all, and its band is of that.
+  VectorXd mean = VectorXd::Zero(k);
+  for (const Drawn& point : points) mean += point.columns / static_cast<double>(points.size());
+  for (Drawn& point : points) point.columns -= mean;
+  return points;
+}
+
+std::vector<Drawn> drawn_curve(const Curve& curve, double low, double high) {
+  constexpr int kPoints = 25;
+  std::vector<Drawn> points;
+  for (int p = 0; p < kPoints; ++p) {
+    const double x = low + static_cast<double>(p) / (kPoints - 1) * (high - low);
+    points.push_back({x, VectorXd(static_cast<Index>(curve.columns.size()))});
+    for (std::size_t b = 0; b < curve.columns.size(); ++b)
+      points.back().columns(static_cast<Index>(b)) = tilted_column(curve.shape, curve.tilt, b, x, low, high);
+  }
+  return points;
+}
+
+}  // namespace
+
 UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
                           const std::vector<int>& rows) {
-  constexpr int kPoints = 25;
   UnknownStructure result{.covariate = found.curve.covariate,
                           .covariate_unit = {},
                           .rotor = found.curve.rotor,
                           .p_value = found.p,
                           .shape = {},
+                          .levels = found.curve.shape == CurveShape::kLevels,
+                          .labels = found.curve.labels,
                           .instead_of = found.instead_of};
   if (const Covariate* covariate = observations.find(result.covariate))
     result.covariate_unit = covariate->unit;
@@ -38,18 +78,14 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   const double low = within ? 0 : found.curve.x.minCoeff();
   const double high = within ? observations.duration_s.maxCoeff() : found.curve.x.maxCoeff();
   double mean = 0;
-  for (int p = 0; p < kPoints; ++p) {
-    const double u = static_cast<double>(p) / (kPoints - 1);
-    VectorXd basis(k);
-    const double x = low + u * (high - low);
-    for (Index b = 0; b < k; ++b)
-      basis(b) =
-          tilted_column(found.curve.shape, found.curve.tilt, static_cast<std::size_t>(b), x, low, high);
-    const double value = scale * basis.dot(amplitude),
-                 half = 1.96 * scale * std::sqrt(std::max(0.0, basis.dot(covariance * basis)));
-    result.shape.push_back({x, value, value - half, value + half});
-    mean += value / kPoints;
+  for (const Drawn& point : result.levels ? drawn_levels(found.curve) : drawn_curve(found.curve, low, high)) {
+    const double value = scale * point.columns.dot(amplitude),
+                 half =
+                     1.96 * scale * std::sqrt(std::max(0.0, point.columns.dot(covariance * point.columns)));
+    result.shape.push_back({point.x, value, value - half, value + half});
+    mean += value;
   }
+  mean /= static_cast<double>(result.shape.size());
   double lowest = 1e300, highest = -1e300;
   for (ShapePoint& point : result.shape) {
     point.y -= mean;
@@ -64,7 +100,12 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
 
 UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual,
                                    const std::vector<int>& rows) {
-  UnknownStructure result{"session", "", -1, 0.025, 0, {}, {}};
+  UnknownStructure result{.covariate = "session",
+                          .covariate_unit = {},
+                          .p_value = 0.025,
+                          .shape = {},
+                          .labels = {},
+                          .instead_of = {}};
   std::map<int, std::vector<double>> offsets;
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const double mean = -residual.row(static_cast<Index>(r)).mean();

@@ -54,6 +54,8 @@ struct UnknownStructure {
   double p_value = 1;
   double amplitude = 0;  // half of peak to peak, unit of the response
   std::vector<ShapePoint> shape;
+  bool levels = false;                  // the shape is one of few values, and nothing lies between them
+  std::vector<std::string> labels;      // of a column of texts: x = i + 1 stands for labels[i]
   std::vector<std::string> instead_of;  // effects over this covariate that do not follow it
 };
 

@@ -144,6 +144,7 @@ class Page {
     Json json{{"label", label},
               {"covariate", covariate},
               {"covariate_unit", known == nullptr ? "" : known->unit},
+              {"labels", known == nullptr ? std::vector<std::string>{} : known->labels},
               {"rotor", rotor_number(rotor)}};
     for (Index c = 0; c < observations_.channels(); ++c) {
       if (rotor >= 0 && c != rotor) continue;
@@ -198,7 +199,9 @@ class Page {
       for (Index row = 0; row < shape.rows(); ++row)
         for (Index c = 0; c < shape.cols(); ++c)
           if (curve.rotor < 0 || c == curve.rotor)
-            shape(row, c) = interpolated(unknown.shape, curve.x(row, curve.x.cols() > 1 ? c : 0));
+            shape(row, c) = unknown.levels
+                                ? at_level(unknown.shape, curve.x(row, 0), curve.levels[0])
+                                : interpolated(unknown.shape, curve.x(row, curve.x.cols() > 1 ? c : 0));
       // Time of day is drawn by what the curve is of: hours since the session's first run.
       const std::string name = curve.covariate == "start_utc" ? "hours_in_session" : curve.covariate;
       list.push_back(panel("unknown: " + curve.label(), name, curve.x, curve.rotor, visible(shape)));
@@ -210,6 +213,14 @@ class Page {
       list.push_back(
           panel("unknown: session", "session", block, -1, MatrixXd::Zero(after_.rows(), after_.cols())));
     }
+  }
+
+  /// A value that is too rare to be told apart counts as the most common one.
+  static double at_level(const std::vector<ShapePoint>& shape, double x, double most_common) {
+    const auto of = [&](double value) {
+      return std::find_if(shape.begin(), shape.end(), [&](const ShapePoint& p) { return p.x == value; });
+    };
+    return of(x) != shape.end() ? of(x)->y : of(most_common)->y;
   }
 
   static double interpolated(const std::vector<ShapePoint>& shape, double x) {

@@ -55,10 +55,29 @@ Json unknown_json(const UnknownStructure& unknown) {
   Json shape = Json::array();
   for (const ShapePoint& point : unknown.shape)
     shape.push_back({finite(point.x), finite(point.y), finite(point.low), finite(point.high)});
-  return {{"covariate", unknown.covariate},         {"covariate_unit", unknown.covariate_unit},
-          {"rotor", rotor_json(unknown.rotor)},     {"p_value", finite(unknown.p_value)},
-          {"amplitude", finite(unknown.amplitude)}, {"shape", shape},
+  return {{"covariate", unknown.covariate},
+          {"covariate_unit", unknown.covariate_unit},
+          {"rotor", rotor_json(unknown.rotor)},
+          {"p_value", finite(unknown.p_value)},
+          {"amplitude", finite(unknown.amplitude)},
+          {"shape", shape},
+          {"labels", unknown.labels},
           {"instead_of", unknown.instead_of}};
+}
+
+std::string name_of_value(const UnknownStructure& unknown, double x) {
+  if (unknown.labels.empty()) return fmt::format("{:g}", x);
+  const std::string& label = unknown.labels[static_cast<std::size_t>(x) - 1];
+  return label.empty() ? "(empty)" : label;
+}
+
+/// What each text or, of few, each value makes: "A −0.012, B 0.012 N".
+std::string levels_in_words(const UnknownStructure& unknown, const std::string& unit) {
+  std::string text;
+  for (const ShapePoint& point : unknown.shape)
+    text += fmt::format("{}{} {:+.3g} ± {:.2g}", text.empty() ? "" : ", ", name_of_value(unknown, point.x),
+                        point.y, (point.high - point.low) / 2);
+  return text + unit;
 }
 
 std::string parameters_in_words(const AdoptedEffect& adopted) {
@@ -177,6 +196,7 @@ std::string explanation_text(const Explanation& e) {
     text += fmt::format("\n  unknown: depends on {}{}, amplitude {:.3g}{}, p = {:.3g}\n", u.covariate,
                         u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit,
                         u.p_value);
+    if (u.levels) text += wrapped("  " + levels_in_words(u, unit));
     if (!u.instead_of.empty())
       text += fmt::format("    in which it bends away from the formula of {}\n", joined(u.instead_of));
   }

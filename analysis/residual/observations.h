@@ -19,9 +19,10 @@ namespace tunnelrig {
 /// recorded.
 struct Covariate {
   std::string name;
-  Eigen::MatrixXd value;  // runs × 1, or runs × channels where each channel has its own
-  bool derived = false;   // made here, not a column of the sheet
-  std::string unit = {};  // empty: the name says it, or it is not known
+  Eigen::MatrixXd value;                 // runs × 1, or runs × channels where each channel has its own
+  bool derived = false;                  // made here, not a column of the sheet
+  std::string unit = {};                 // empty: the name says it, or it is not known
+  std::vector<std::string> labels = {};  // of a column of texts: value i + 1 stands for labels[i]
 
   bool per_channel() const { return value.cols() > 1; }
   double at(Eigen::Index run, Eigen::Index channel) const { return value(run, per_channel() ? channel : 0); }

@@ -38,6 +38,8 @@ Search::CurveScan Search::scan_curves() const {
     const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
       return is_over(each, a.term.effect->covariates);
     });
+    // What is straight over few values has a name then, and the bends ask for the rest.
+    if (named && each.shape == CurveShape::kLevels) continue;
     Curve curve = named ? without_trend(each, rows_) : each;
     Candidate candidate = as_candidate(curve);
     if (!mixed_->sees(candidate.columns[0])) continue;

@@ -98,8 +98,8 @@ std::vector<IsolatedValue> isolated_values(const Observations& observations) {
   constexpr Index kFewestRows = 8;
   std::vector<IsolatedValue> result;
   for (const Covariate& covariate : observations.covariates) {
-    if (covariate.derived || covariate.per_channel() || covariate.value.rows() < kFewestRows ||
-        observations.not_usable.contains(covariate.name))
+    if (covariate.derived || covariate.per_channel() || !covariate.labels.empty() ||
+        covariate.value.rows() < kFewestRows || observations.not_usable.contains(covariate.name))
       continue;
     std::vector<Index> order(static_cast<std::size_t>(covariate.value.rows()));
     std::iota(order.begin(), order.end(), Index{0});

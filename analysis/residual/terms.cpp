@@ -216,6 +216,7 @@ Testability testability(const Effect& effect, const Observations& observations) 
     }
     if (const auto why = observations.not_usable.find(name); why != observations.not_usable.end())
       result.reason = name + " is " + why->second;
+    if (!covariate->labels.empty()) result.reason = name + " is a column of texts";
   }
   // With the standard's air nothing changes, and a gradient is the drift of zero by another name.
   if ((effect.name == "air_temperature" || effect.name == "temperature_gradient") &&

@@ -106,6 +106,35 @@ TEST(ApplyModel, ACurveIsTakenOutAndHeldBeyondItsRange) {
   EXPECT_EQ(reduction.model_name(), "version 1 (curve over clip (empirical))");
 }
 
+TEST(ApplyModel, LevelsHoldWhereTheyWereSeenOnly) {
+  ModelVersion model{.version = 1, .explanation = "{}"};
+  model.curves = {{.covariate = "blades",
+                   .shape = CurveShape::kLevels,
+                   .low = 1,
+                   .high = 2,
+                   .coefficients = {0.03},
+                   .centre = {0.01},
+                   .levels = {2, 1},
+                   .labels = {"new", "old"}}};
+  model.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-6);
+  CampaignData data = four_runs();
+  // other texts are in this campaign, so that their numbers are others
+  for (std::size_t i = 0; i < 4; ++i) data.runs[i].labels["blades"] = i < 2 ? "old" : i < 3 ? "new" : "bent";
+  const Reduction reduction = corrected(data, model_from_json(model_json(model), "it"));
+  ASSERT_EQ(reduction.runs.size(), 3u);
+  const auto ratio = [&](std::size_t run) {
+    return reduction.runs[run].thrust_N[0] / *data.runs[run].thrust_N[0];
+  };
+  EXPECT_NEAR(ratio(0), std::exp(0.03 * 0.01), 1e-12) << "the most common: no more than the centre";
+  EXPECT_NEAR(ratio(2), std::exp(-0.03 * (1 - 0.01)), 1e-12);
+  ASSERT_EQ(reduction.left_out.size(), 1u);
+  EXPECT_THAT(reduction.left_out[0].reason,
+              HasSubstr("its blades is none that the adopted curve over blades"));
+  model.curves[0].levels = {1};
+  EXPECT_THAT(message_of([&] { model_from_json(model_json(model), "it"); }),
+              HasSubstr("one level more than coefficients"));
+}
+
 TEST(ApplyModel, ARunWithoutTheCovariateIsLeftOutWithTheReason) {
   CampaignData data = four_runs();
   data.runs[1].numbers.erase("air_pressure_Pa");

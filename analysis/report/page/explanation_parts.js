@@ -110,7 +110,14 @@ function confusionText({confounded_with: rivals, separating_run: run}) {
   return `These data cannot tell it from ${list}.${remedy}`;
 }
 
-const unknownText = ({covariate, rotor, amplitude, p_value: p, instead_of: insteadOf = []}, unit) =>
-    `Depends on \`${covariate}\`${rotor ? ` at rotor ${rotor}` : ''}: amplitude ${digits(amplitude)}${
-        unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${
-        insteadOf.length ? ` It bends away from the formula of ${insteadOf.join(', ')}.` : ''}`;
+/** What each text makes, against the mean of all. */
+const labelsText = ({shape, labels = []}, unit) => labels.length === 0 ?
+    '' :
+    ` ${shape.map(([x, y]) => `${labels[x - 1] || '(empty)'} ${digits(y)}`).join(', ')}${unitSuffix(unit)}.`;
+
+const unknownText = (unknown, unit) => {
+  const {covariate, rotor, amplitude, p_value: p, instead_of: insteadOf = []} = unknown;
+  return `Depends on \`${covariate}\`${rotor ? ` at rotor ${rotor}` : ''}: amplitude ${digits(amplitude)}${
+      unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${labelsText(unknown, unit)}${
+      insteadOf.length ? ` It bends away from the formula of ${insteadOf.join(', ')}.` : ''}`;
+};

@@ -23,7 +23,10 @@ const plainUnits = {
   clip_fraction: '–'
 };
 
-/** "air_temperature_C [°C]"; what says nothing of its unit stands alone. A table's column has a unit of its own. */
+/**
+ * "air_temperature_C [°C]"; what says nothing of its unit stands alone. A table's column has a unit of its
+ * own.
+ */
 function covariateTitle(name, own) {
   if (own && own !== '1') return `${plain(name)} [${plain(own)}]`;
   const suffix = Object.keys(suffixes).find((end) => name.endsWith(end));
@@ -71,6 +74,7 @@ const runText = (i, channel) => {
 /** Clouds of residuals with the means of like x, and what the effect makes of them. */
 function drawPanel(panel, which, reach) {
   const bins = binsOf(panel.x), means = binned(panel.x, panel[which], bins);
+  const texts = panel.labels.map((label) => plain(label || '(empty)'));
   const [blue, orange] = rotorColours();
   const data = [
     {
@@ -99,7 +103,7 @@ function drawPanel(panel, which, reach) {
     const curve = binned(panel.x, panel.fitted, bins);
     data.push({
       type: 'scatter',
-      mode: 'lines+markers',
+      mode: texts.length ? 'markers' : 'lines+markers',  // nothing lies between texts
       name: 'fitted',
       x: curve.at,
       y: curve.middle,
@@ -108,10 +112,17 @@ function drawPanel(panel, which, reach) {
       hovertemplate: 'fitted at %{x:.4g}: %{y:.4g}<extra></extra>'
     });
   }
+  const ticks = texts.length ? {
+    tickvals: texts.map((_, i) => i + 1),
+    ticktext: texts,
+    range: [0.5, texts.length + 0.5],
+    showgrid: false
+  } :
+                               {};
   return {
     data,
     layout: {
-      xaxis: axis(covariateTitle(panel.covariate, panel.covariate_unit), {zeroline: false}),
+      xaxis: axis(covariateTitle(panel.covariate, panel.covariate_unit), {zeroline: false, ...ticks}),
       yaxis: axis(residualTitle(), {range: [-reach, reach]}),
       showlegend: true,
       legend: {orientation: 'h', y: 1.02, yanchor: 'bottom'}

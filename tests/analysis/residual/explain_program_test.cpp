@@ -113,6 +113,33 @@ TEST_F(ExplainProgram, FindsNothingWhereNothingIs) {
   EXPECT_EQ(e["after"], e["before"]);
 }
 
+TEST_F(ExplainProgram, AColumnOfTextsIsACondition) {
+  // "spare" is in one run only, which no one can tell from that run's scatter
+  write_campaign(12, ",battery", [&](SimulatedRun& run) {
+    run.extra = run.number == 50 ? ",spare" : std::vector<std::string>{",", ",red", ",blue"}[random() % 3];
+    if (run.extra == ",red") run.thrust_factor = 0.985;
+  });
+  import_campaign();
+  const json e = explained("--adopt-empirical --html e.html");
+  EXPECT_EQ(e["verdict"], "unknown") << text;
+  ASSERT_EQ(e["unknown"].size(), 1u);
+  const json& battery = e["unknown"][0];
+  EXPECT_EQ(battery["covariate"], "battery");
+  EXPECT_EQ(battery["labels"], json({"", "blue", "red", "spare"}));
+  ASSERT_EQ(battery["shape"].size(), 3u) << battery;
+  EXPECT_EQ(battery["shape"][2][0], 3) << "red";
+  EXPECT_NEAR(battery["shape"][2][1], -7 * 0.015 * 2 / 3, 0.02) << "against the mean of the three";
+  EXPECT_THAT(text, HasSubstr("(empty) +0.0"));
+  EXPECT_THAT(text, HasSubstr("red -0.0"));
+  EXPECT_THAT(read_text(folder / "e.html"), HasSubstr("unknown: battery"));
+
+  const ProgramResult reduced = run("reduce --db c.db");
+  EXPECT_EQ(reduced.code, 1) << reduced.error;
+  EXPECT_THAT(reduced.error, HasSubstr("R051 is left out: its battery is none that the adopted curve over battery"));
+  const json again = explained("--response c_t");
+  EXPECT_EQ(again["unknown"][0]["covariate"], "battery") << "explain holds measurements against the thesis";
+}
+
 TEST_F(ExplainProgram, ARunWithARotorThatPushesIsLeftOutAndSaid) {
   write_campaign(10, "", [](SimulatedRun& run) {
     sag(run);

@@ -69,7 +69,7 @@ void expect_contract(const Explanation& explanation) {
     }
   }
   for (const json& unknown : written["unknown"]) {
-    for (const char* key : {"covariate", "rotor", "p_value", "amplitude", "shape", "instead_of"})
+    for (const char* key : {"covariate", "rotor", "p_value", "amplitude", "shape", "labels", "instead_of"})
       EXPECT_TRUE(unknown.contains(key)) << key;
     for (const json& point : unknown["shape"]) EXPECT_EQ(point.size(), 4u);
   }
@@ -174,6 +174,40 @@ TEST_F(ExplainTest, StructureWithoutANameIsUnknown) {
   ASSERT_EQ(both.adopted.size(), 1u);
   EXPECT_EQ(both.adopted[0].term.effect->name, "supply_voltage");
   expect_contract(both);
+}
+
+/// A switch, or a few settings: nothing lies between them, and no wave or bend sees them.
+TEST_F(ExplainTest, FewValuesAreHeldAgainstEachOther) {
+  for (const int values : {2, 3, 5}) {
+    Observations o = observations(16);
+    test::add_covariate(o, "foam_layers", 0, values, random);
+    Covariate& foam = o.covariates.back();
+    foam.value = foam.value.array().floor().matrix();
+    const Eigen::MatrixXd linear = 0.006 / (values - 1) * foam.value;
+    test::set_y(o, o.y + linear.replicate(1, 4));
+    const Explanation e = explained(o);
+    SCOPED_TRACE(explanation_text(e));
+    EXPECT_EQ(e.verdict, "unknown");
+    ASSERT_EQ(e.unknown.size(), 1u);
+    EXPECT_EQ(e.unknown[0].covariate, "foam_layers");
+    ASSERT_EQ(e.unknown[0].shape.size(), static_cast<std::size_t>(values));
+    const ShapePoint &first = e.unknown[0].shape.front(), &last = e.unknown[0].shape.back();
+    EXPECT_EQ(first.x, 0);
+    EXPECT_EQ(last.x, values - 1);
+    EXPECT_NEAR(last.y - first.y, 0.006 * 7, 0.3 * 0.006 * 7) << "newtons";
+    EXPECT_LT(first.low, first.y);
+    EXPECT_TRUE(e.unknown[0].labels.empty());
+    expect_contract(e);
+  }
+}
+
+TEST_F(ExplainTest, AValueThatTwoBlocksHaveIsNotToldFromTheirScatter) {
+  Observations o = observations(16);
+  Covariate fan{"fan_on", Eigen::MatrixXd::Zero(o.rows(), 1)};
+  for (const int row : o.all_rows())
+    if (o.block[static_cast<std::size_t>(row)] < 2) fan.value(row, 0) = 1;
+  o.covariates.push_back(fan);
+  for (const Curve& curve : curves_to_try(o, o.all_rows())) EXPECT_NE(curve.covariate, "fan_on");
 }
 
 /// A trend that bends: the best formula of the library takes the trend, and is not what the covariate does.
