@@ -41,6 +41,7 @@ Observation read_row(const Sheet& sheet, std::size_t row, const TableSchema& sch
     observation.diameter_m = sheet.require_number(row, *schema.diameter_column) * schema.diameter_unit_m;
   }
   for (const TableColumn& column : schema.covariates) {
+    if (column.unit == kTextUnit) continue;
     const auto value = converted(sheet, row, column);
     if (!value) continue;
     if (column.column == schema.speed_column) observation.speed_rpm = *value * schema.speed_factor;

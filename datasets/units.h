@@ -18,6 +18,9 @@ struct Unit {
   double convert(double value) const { return value * factor + offset; }
 };
 
+/// Of a column that holds no numbers: which battery, whose blades.
+inline constexpr std::string_view kTextUnit = "text";
+
 /// The unit of that name ("gf", "rpm", "in", "degC", "%", …); throws InputError listing what is known.
 const Unit& unit_from_name(std::string_view name);
 

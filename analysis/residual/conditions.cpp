@@ -49,14 +49,41 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
   return result;
 }
 
-void warn_of_constant(const Observations& observations, Explanation& explanation) {
-  for (const Covariate& covariate : observations.covariates)
-    if (!covariate.derived && covariate.labels.empty() && !observations.not_usable.contains(covariate.name) &&
-        !observations.assumed.contains(covariate.name) &&
-        covariate.value.maxCoeff() == covariate.value.minCoeff())
+bool varies_within_groups(const Observations& observations, const Covariate& covariate) {
+  std::map<int, double> first;
+  for (const int row : observations.all_rows()) {
+    const double value = covariate.value(row, 0);
+    if (first.emplace(observations.group[static_cast<std::size_t>(row)], value).first->second != value)
+      return true;
+  }
+  return false;
+}
+
+/// Why nothing can be found that follows a condition; empty where something can.
+std::string unseen(const Observations& observations, const Covariate& covariate,
+                   const std::vector<int>& rows) {
+  const bool texts = !covariate.labels.empty(), table = observations.from_table;
+  const int values = different_values(covariate, rows);
+  if (values == 1) return texts ? "" : fmt::format("is the same in every {}", table ? "row" : "run");
+  if (!varies_within_groups(observations, covariate))
+    return fmt::format("does not vary within any {}, whose own coefficient absorbs what follows it",
+                       table ? "group" : "location");
+  if ((texts || values == 2) && levels_of(observations, covariate, rows).empty())
+    return "has no two to eight values that are in three blocks each";
+  return "";
+}
+
+void warn_of_unseen(const Observations& observations, const std::vector<int>& rows,
+                    Explanation& explanation) {
+  for (const Covariate& covariate : observations.covariates) {
+    if (covariate.derived || covariate.per_channel() || observations.not_usable.contains(covariate.name) ||
+        observations.assumed.contains(covariate.name) || covariate.value.array().isNaN().any())
+      continue;
+    const std::string why = unseen(observations, covariate, rows);
+    if (!why.empty())
       explanation.warnings.push_back(
-          fmt::format("{} is the same in every {}: nothing can be found that follows it", covariate.name,
-                      observations.from_table ? "row" : "run"));
+          fmt::format("{} {}: nothing can be found that follows it", covariate.name, why));
+  }
 }
 
 void warn_of_collinear(const Observations& observations, Explanation& explanation) {
@@ -94,7 +121,7 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
 void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
                        const std::vector<int>& rows, Explanation& explanation) {
   explanation.untestable = untestable_effects(observations, effects, rows);
-  warn_of_constant(observations, explanation);
+  warn_of_unseen(observations, rows, explanation);
   warn_of_collinear(observations, explanation);
 }
 

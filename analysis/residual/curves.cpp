@@ -57,34 +57,6 @@ std::vector<CurveShape> bends_over(const Observations& observations, const Covar
   return {CurveShape::kParabola};
 }
 
-/// Where nearly all rows have one of few values: these, the most common first; nothing elsewhere.
-std::vector<double> levels_of(const Observations& observations, const Covariate& covariate,
-                              const std::vector<int>& rows) {
-  struct Level {
-    std::size_t rows = 0;
-    std::set<int> blocks;
-  };
-  if (covariate.derived || covariate.per_channel()) return {};
-  std::map<double, Level> all;
-  for (const int row : rows) {
-    Level& level = all[covariate.value(row, 0)];
-    ++level.rows;
-    level.blocks.insert(observations.block[static_cast<std::size_t>(row)]);
-  }
-  std::vector<double> levels;
-  std::size_t held = 0;
-  for (const auto& [value, level] : all) {
-    if (level.blocks.size() < kBlocksPerLevel) continue;
-    levels.push_back(value);
-    held += level.rows;
-  }
-  if (levels.size() < 2 || levels.size() > kMostLevels || 10 * held < 9 * rows.size()) return {};
-  std::iter_swap(levels.begin(), std::max_element(levels.begin(), levels.end(), [&](double a, double b) {
-                   return all[a].rows < all[b].rows;
-                 }));
-  return levels;
-}
-
 std::vector<Components> level_columns(const Observations& observations, const Covariate& covariate, int rotor,
                                       const std::vector<double>& levels) {
   std::vector<Components> columns;
@@ -97,12 +69,6 @@ std::vector<Components> level_columns(const Observations& observations, const Co
               level_column(levels, static_cast<int>(k), covariate.value(row, 0));
   }
   return columns;
-}
-
-int different_values(const Covariate& covariate, const std::vector<int>& rows) {
-  std::set<double> values;
-  for (const int row : rows) values.insert(covariate.value(row, 0));
-  return static_cast<int>(values.size());
 }
 
 /// The widest part of the covariate's range without a row in it, over that range.
@@ -136,6 +102,39 @@ std::string reported_name(const std::string& covariate) {
 
 std::string Curve::label() const {
   return rotor < 0 ? covariate : covariate + fmt::format(" of rotor {}", rotor + 1);
+}
+
+int different_values(const Covariate& covariate, const std::vector<int>& rows) {
+  std::set<double> values;
+  for (const int row : rows) values.insert(covariate.value(row, 0));
+  return static_cast<int>(values.size());
+}
+
+std::vector<double> levels_of(const Observations& observations, const Covariate& covariate,
+                              const std::vector<int>& rows) {
+  struct Level {
+    std::size_t rows = 0;
+    std::set<int> blocks;
+  };
+  if (covariate.derived || covariate.per_channel()) return {};
+  std::map<double, Level> all;
+  for (const int row : rows) {
+    Level& level = all[covariate.value(row, 0)];
+    ++level.rows;
+    level.blocks.insert(observations.block[static_cast<std::size_t>(row)]);
+  }
+  std::vector<double> levels;
+  std::size_t held = 0;
+  for (const auto& [value, level] : all) {
+    if (level.blocks.size() < kBlocksPerLevel) continue;
+    levels.push_back(value);
+    held += level.rows;
+  }
+  if (levels.size() < 2 || levels.size() > kMostLevels || 10 * held < 9 * rows.size()) return {};
+  std::iter_swap(levels.begin(), std::max_element(levels.begin(), levels.end(), [&](double a, double b) {
+                   return all[a].rows < all[b].rows;
+                 }));
+  return levels;
 }
 
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows) {

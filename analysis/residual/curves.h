@@ -30,6 +30,13 @@ struct Curve {
 /// covariate can show: one for every three different values, at most six.
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows);
 
+/// How many values `rows` have; of the first channel.
+int different_values(const Covariate& covariate, const std::vector<int>& rows);
+
+/// Where nearly all of `rows` have one of few values: these, the most common first; nothing elsewhere.
+std::vector<double> levels_of(const Observations& observations, const Covariate& covariate,
+                              const std::vector<int>& rows);
+
 /// The same without what is straight: beside a named effect of the same covariate, whose work that is.
 Curve without_trend(const Curve& curve, const std::vector<int>& rows);
 

@@ -7,8 +7,8 @@ namespace tunnelrig {
 
 // --- conditions.cpp
 
-/// Effects that cannot be tried and why; conditions that never changed, and so keep an effect from being
-/// tested; pairs of covariates that no campaign of this design can tell apart.
+/// Effects that cannot be tried and why; conditions that nothing can be found to follow, because they never
+/// changed or the baseline takes it; pairs of covariates that no campaign of this design can tell apart.
 void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
                        const std::vector<int>& rows, Explanation& explanation);
 

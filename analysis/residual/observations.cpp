@@ -15,6 +15,16 @@ std::vector<T> picked(const std::vector<T>& from, const std::vector<int>& rows) 
 
 }  // namespace
 
+Covariate covariate_of_texts(const std::string& name, const std::vector<std::string>& texts) {
+  const std::set<std::string> different(texts.begin(), texts.end());
+  Covariate covariate{name, Eigen::MatrixXd(static_cast<Eigen::Index>(texts.size()), 1)};
+  covariate.labels.assign(different.begin(), different.end());
+  for (std::size_t row = 0; row < texts.size(); ++row)
+    covariate.value(static_cast<Eigen::Index>(row), 0) =
+        1 + static_cast<double>(std::distance(different.begin(), different.find(texts[row])));
+  return covariate;
+}
+
 std::vector<int> Observations::all_rows() const {
   std::vector<int> all(static_cast<std::size_t>(rows()));
   std::iota(all.begin(), all.end(), 0);

@@ -28,6 +28,9 @@ struct Covariate {
   double at(Eigen::Index run, Eigen::Index channel) const { return value(run, per_channel() ? channel : 0); }
 };
 
+/// A column of texts; an empty cell is a text as well.
+Covariate covariate_of_texts(const std::string& name, const std::vector<std::string>& texts);
+
 /// n runs (rows of a table) by c channels (rotors; 1 for a table).
 ///
 /// Where the response has one sign the model is multiplicative: `y` is the logarithm of the response over

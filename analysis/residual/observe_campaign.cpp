@@ -98,24 +98,19 @@ void add_sheet_covariates(const Source& source, Observations& result) {
   }
 }
 
-/// Columns of texts: which battery, which blades. An empty cell is a text as well.
-void add_labels(const Source& source, Observations& result) {
-  std::map<std::string, std::set<std::string>> texts;
-  const auto text_of = [&source](Index row, const std::string& name) {
-    const auto& labels = source.run(row).labels;
-    const auto found = labels.find(name);
-    return found == labels.end() ? std::string() : found->second;
-  };
+/// Columns of texts: which battery, which blades.
+void add_texts(const Source& source, Observations& result) {
+  std::set<std::string> names;
   for (Index row = 0; row < source.rows(); ++row)
-    for (const auto& [name, text] : source.run(row).labels) texts[name];
-  for (auto& [name, values] : texts) {
-    for (Index row = 0; row < source.rows(); ++row) values.insert(text_of(row, name));
-    Covariate covariate{name, MatrixXd(source.rows(), 1)};
-    covariate.labels.assign(values.begin(), values.end());
-    for (Index row = 0; row < source.rows(); ++row)
-      covariate.value(row, 0) =
-          1 + static_cast<double>(std::distance(values.begin(), values.find(text_of(row, name))));
-    result.covariates.push_back(std::move(covariate));
+    for (const auto& [name, text] : source.run(row).labels) names.insert(name);
+  for (const std::string& name : names) {
+    std::vector<std::string> texts;
+    for (Index row = 0; row < source.rows(); ++row) {
+      const auto& labels = source.run(row).labels;
+      const auto found = labels.find(name);
+      texts.push_back(found == labels.end() ? "" : found->second);
+    }
+    result.covariates.push_back(covariate_of_texts(name, texts));
   }
 }
 
@@ -313,7 +308,7 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
     if (const RunStatistics* statistics = source.statistics(row))
       result.duration_s(row) = static_cast<double>(statistics->frames) / data.info.daq.sample_rate_hz;
   add_sheet_covariates(source, result);
-  add_labels(source, result);
+  add_texts(source, result);
   add_derived_covariates(source, result);
   add_raw_covariates(source, result);
   if (result.response == "thrust" || result.response == "cell") add_courses(source, result);

@@ -31,6 +31,11 @@ struct Source {
   double cell(Index r, const std::string& column) const {
     return table.sheet.number(rows[static_cast<std::size_t>(r)], column).value_or(kNaN);
   }
+  std::vector<std::string> texts(const std::string& column) const {
+    std::vector<std::string> result;
+    for (const std::size_t row : rows) result.push_back(table.sheet.text(row, column));
+    return result;
+  }
   double converted(Index r, const TableColumn& column) const {
     const double mechanical = column.column == table.schema.speed_column ? table.schema.speed_factor : 1;
     return unit_from_name(column.unit).convert(cell(r, column.column)) * mechanical;
@@ -78,7 +83,9 @@ void add_covariates(const Source& source, Observations& result) {
     result.covariates.push_back(std::move(covariate));
   };
   for (const TableColumn& column : schema.covariates)
-    if (column.column != result.response)  // which would explain itself
+    if (column.unit == kTextUnit)
+      result.covariates.push_back(covariate_of_texts(column.column, source.texts(column.column)));
+    else if (column.column != result.response)  // which would explain itself
       add(column.meaning.empty() ? column.column : column.meaning, unit_after_conversion(column.unit),
           [&](Index r) { return source.converted(r, column); });
   if (schema.diameter_column || schema.diameter_m)

@@ -63,6 +63,8 @@ TEST(Observations, ConvertsToSi) {
 TEST(Observations, NamesWhatIsWrong) {
   EXPECT_THAT(refusal(kSchema, "unit = \"gf\"", "unit = \"slug\""),
               HasSubstr("s.toml:7: T: 'slug' is not a known unit"));
+  EXPECT_THAT(refusal(kSchema, "unit = \"gf\"\nmeaning = \"thrust_N\"", "unit = \"text\""),
+              HasSubstr("s.toml:9: response.unit is \"text\""));
   EXPECT_THAT(refusal(kSchema, "unit = \"gf\"", "unit = \"V\""),
               HasSubstr("thrust_N is a force, and 'V' is a unit of voltage"));
   EXPECT_THAT(refusal(kSchema, "column = \"T\"", "column = \"thrust\""),

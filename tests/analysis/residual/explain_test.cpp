@@ -208,6 +208,19 @@ TEST_F(ExplainTest, AValueThatTwoBlocksHaveIsNotToldFromTheirScatter) {
     if (o.block[static_cast<std::size_t>(row)] < 2) fan.value(row, 0) = 1;
   o.covariates.push_back(fan);
   for (const Curve& curve : curves_to_try(o, o.all_rows())) EXPECT_NE(curve.covariate, "fan_on");
+  EXPECT_THAT(
+      explained(o).warnings,
+      Contains("fan_on has no two to eight values that are in three blocks each: nothing can be found "
+               "that follows it"));
+}
+
+TEST_F(ExplainTest, AConditionThatOnlyLocationsDifferByIsSaid) {
+  Observations o = observations(16);
+  Covariate height{"stand_height_m", Eigen::MatrixXd(o.rows(), 1)};
+  for (const int row : o.all_rows()) height.value(row, 0) = 0.5 + o.group[static_cast<std::size_t>(row)];
+  o.covariates.push_back(height);
+  EXPECT_THAT(explained(o).warnings,
+              Contains(HasSubstr("stand_height_m does not vary within any location, whose own coefficient")));
 }
 
 /// A trend that bends: the best formula of the library takes the trend, and is not what the covariate does.

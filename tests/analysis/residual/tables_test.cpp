@@ -3,6 +3,7 @@
 #include "analysis/residual/explanation_output.h"
 #include "analysis/residual/explanation_parts.h"
 #include "analysis/residual/simulated.h"
+#include "support/message_of.h"
 #include "support/seeds.h"
 
 #include <cmath>
@@ -233,6 +234,28 @@ TEST_F(TablesTest, EffectsAreAddedToNegativeResponsesWithTheirSign) {
 }
 
 /// Between two supplies nothing was measured: no wave is laid there.
+TEST_F(TablesTest, TextsAreHeldAgainstEachOther) {
+  std::string csv = "b,maker,V,y\n";
+  for (int r = 0; r < 96; ++r) {
+    const bool ours = even(random) < 0.5;
+    csv += fmt::format("{},{},{},{}\n", r / 8, ours ? "ours" : "theirs", 10.5 + 2 * even(random),
+                       8 * (ours ? 0.99 : 1) * (1 + 0.003 * scatter(random)));
+  }
+  const std::string schema =
+      "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+      "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n";
+  const Explanation e =
+      explained(observed(csv, schema + "[[covariates]]\ncolumn = \"maker\"\nunit = \"text\"\n"));
+  SCOPED_TRACE(explanation_text(e));
+  EXPECT_EQ(names(e), "");
+  ASSERT_EQ(e.unknown.size(), 1u);
+  EXPECT_EQ(e.unknown[0].covariate, "maker");
+  EXPECT_THAT(e.unknown[0].labels, testing::ElementsAre("ours", "theirs"));
+  EXPECT_NEAR(e.unknown[0].shape[0].y, -0.04, 0.02);
+  EXPECT_THAT(test::message_of([&] { observed(csv, schema + "[[covariates]]\ncolumn = \"maker\"\n"); }),
+              HasSubstr("maker"));
+}
+
 TEST_F(TablesTest, CurvesDoNotSwingInAGap) {
   std::string csv = "b,V,y\n";
   for (int r = 0; r < 96; ++r)
