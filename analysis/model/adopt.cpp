@@ -30,10 +30,6 @@ ModelTerm model_term(const AdoptedEffect& adopted, const Observations& observati
   return term;
 }
 
-const Covariate* covariate_of(const Observations& observations, const Curve& curve) {
-  return observations.find(curve.covariate == "start_utc" ? "hours_in_session" : curve.covariate);
-}
-
 ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Observations& observations) {
   ModelCurve result{.covariate = curve.covariate,
                     .rotor = curve.rotor,
@@ -45,7 +41,7 @@ ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Obse
                     .levels = curve.levels,
                     .labels = curve.labels};
   // The mean over the runs is the baseline's: without it the curve would shift every coefficient.
-  const Covariate& covariate = *covariate_of(observations, curve);
+  const Covariate& covariate = *observations.find(curve.covariate);
   const Index rotor = std::max(curve.rotor, 0);
   result.centre.assign(result.coefficients.size(), 0);
   for (std::size_t k = 0; k < result.centre.size(); ++k) {

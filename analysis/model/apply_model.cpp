@@ -29,11 +29,6 @@ bool may_be_absent(const std::string& covariate) {
   return covariate == "ground_distance_R" || covariate == "ceiling_distance_R";
 }
 
-/// The curves call the hours since the session's first run by the column that they come from.
-std::string covariate_of(const ModelCurve& curve) {
-  return curve.covariate == "start_utc" ? "hours_in_session" : curve.covariate;
-}
-
 /// T = e(F) for all rotors of a run at once, and back.
 class Forward {
  public:
@@ -50,7 +45,7 @@ class Forward {
     for (const ModelCurve& curve : model.curves) {
       first_curve_.push_back(next);
       next += static_cast<Index>(curve.coefficients.size());
-      curve_covariates_.push_back(observations.find(covariate_of(curve)));
+      curve_covariates_.push_back(observations.find(curve.covariate));
     }
     predict_forces();
   }

@@ -160,6 +160,7 @@ ModelCurve curve_of(const Reader& reader) {
                    .tilt = reader.has("tilt") ? reader.numbers("tilt") : std::vector<double>(),
                    .levels = reader.has("levels") ? reader.numbers("levels") : std::vector<double>(),
                    .labels = reader.has("labels") ? reader.texts("labels") : std::vector<std::string>()};
+  if (curve.covariate == "start_utc") curve.covariate = "hours_in_session";  // as it was called at first
   if (!(curve.high > curve.low)) reader.fail("has no range: high is not above low");
   if (is_of_logarithm(curve.shape) && !(curve.low > 0))
     reader.fail("has a shape over the logarithm, and a low that is not above 0");

@@ -69,7 +69,7 @@ std::string unseen(const Observations& observations, const Covariate& covariate,
     return fmt::format("does not vary within any {}, whose own coefficient absorbs what follows it",
                        table ? "group" : "location");
   if ((texts || values == 2) && levels_of(observations, covariate, rows).empty())
-    return "has no two to eight values that are in three blocks each";
+    return "has no two to twelve values that are in three blocks each";
   return "";
 }
 

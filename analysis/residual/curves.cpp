@@ -18,7 +18,7 @@ using Eigen::MatrixXd;
 constexpr std::array<int, 3> kBends = {2, 4, 6};
 
 /// A value of few is told apart if as many blocks have it as a step needs on either side.
-constexpr std::size_t kBlocksPerLevel = 3, kMostLevels = 8;
+constexpr std::size_t kBlocksPerLevel = 3, kMostLevels = 12;
 
 Components nothing(const Observations& observations) {
   return Components(1 + observations.shape.size(),
@@ -94,8 +94,20 @@ MatrixXd straight_over(const Curve& curve) {
   return straight;
 }
 
-std::string reported_name(const std::string& covariate) {
-  return covariate == "hours_in_session" ? "start_utc" : covariate;
+/// Whether another condition of the runs goes with it: sessions that all begin at one hour.
+bool repeats_another(const Observations& observations, const Covariate& covariate) {
+  constexpr double kSame = 0.99;  // correlation
+  const auto centred = [](const Covariate& of) {
+    return Eigen::VectorXd(of.value.col(0).array() - of.value.col(0).mean());
+  };
+  const Eigen::VectorXd own = centred(covariate);
+  return std::any_of(observations.covariates.begin(), observations.covariates.end(),
+                     [&](const Covariate& other) {
+                       if (other.name == covariate.name || other.per_channel() || !other.value.allFinite())
+                         return false;
+                       const Eigen::VectorXd theirs = centred(other);
+                       return std::abs(own.dot(theirs)) > kSame * own.norm() * theirs.norm();
+                     });
 }
 
 }  // namespace
@@ -137,6 +149,10 @@ std::vector<double> levels_of(const Observations& observations, const Covariate&
   return levels;
 }
 
+std::string reported_name(const std::string& covariate) {
+  return covariate == "hours_in_session" || covariate == "hour_of_day" ? "start_utc" : covariate;
+}
+
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows) {
   std::vector<int> rotors = {-1};
   for (int rotor = 0; rotor < static_cast<int>(observations.channels()) && observations.channels() > 1;
@@ -156,10 +172,11 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
                           .levels = levels,
                           .labels = covariate.labels});
     if (!covariate.labels.empty()) continue;
+    if (covariate.name == "hour_of_day" && repeats_another(observations, covariate)) continue;
     const int most = different_values(covariate, rows) / 3;
     const auto add = [&](CurveShape shape, int count) {
       for (const int rotor : rotors)
-        curves.push_back({.covariate = reported_name(covariate.name),
+        curves.push_back({.covariate = covariate.name,
                           .rotor = rotor,
                           .shape = shape,
                           .columns = columns_over(observations, covariate, rotor, shape, count),
@@ -180,8 +197,7 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
 }
 
 bool is_over(const Curve& curve, const std::vector<std::string>& covariates) {
-  return std::any_of(covariates.begin(), covariates.end(),
-                     [&](const std::string& name) { return reported_name(name) == curve.covariate; });
+  return std::find(covariates.begin(), covariates.end(), curve.covariate) != covariates.end();
 }
 
 Curve without_trend(const Curve& curve, const std::vector<int>& rows) {

@@ -13,7 +13,7 @@ namespace tunnelrig {
 /// A curve over one covariate, of all rotors alike or of one. It describes; it never names a cause.
 struct Curve {
   std::string
-      covariate;  // a column of the sheet, or "run_order", "time_in_run", "start_utc" (hours in the session)
+      covariate;  // a column of the sheet, or "run_order", "time_in_run", "hours_in_session", "hour_of_day"
   int rotor = -1;
   CurveShape shape = CurveShape::kWaves;
   std::vector<Components> columns;
@@ -42,6 +42,9 @@ Curve without_trend(const Curve& curve, const std::vector<int>& rows);
 
 /// A curve without its straight part that has to do all of the covariate's work: the same with it.
 Curve with_trend(const Curve& curve);
+
+/// The column of runs.csv that a covariate is made of: "start_utc" of both kinds of hours.
+std::string reported_name(const std::string& covariate);
 
 /// Whether one of these covariates is what the curve is over.
 bool is_over(const Curve& curve, const std::vector<std::string>& covariates);

@@ -53,7 +53,8 @@ std::vector<Drawn> drawn_curve(const Curve& curve, double low, double high) {
 
 UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
                           const std::vector<int>& rows) {
-  UnknownStructure result{.covariate = found.curve.covariate,
+  UnknownStructure result{.covariate = reported_name(found.curve.covariate),
+                          .condition = found.curve.covariate,
                           .covariate_unit = {},
                           .rotor = found.curve.rotor,
                           .p_value = found.p,
@@ -61,7 +62,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
                           .levels = found.curve.shape == CurveShape::kLevels,
                           .labels = found.curve.labels,
                           .instead_of = found.instead_of};
-  if (const Covariate* covariate = observations.find(result.covariate))
+  if (const Covariate* covariate = observations.find(result.condition))
     result.covariate_unit = covariate->unit;
   const Components y = difference(response_components(observations), fit.linear.offset);
   const AmplitudeFit amplitudes = fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);
@@ -101,6 +102,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
 UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual,
                                    const std::vector<int>& rows) {
   UnknownStructure result{.covariate = "session",
+                          .condition = "session",
                           .covariate_unit = {},
                           .p_value = 0.025,
                           .shape = {},

@@ -49,6 +49,7 @@ struct ShapePoint {
 
 struct UnknownStructure {
   std::string covariate;       // as runs.csv has it, or session, run_order, time_in_run
+  std::string condition;       // the same as the observations have it: hours_in_session, hour_of_day
   std::string covariate_unit;  // empty: the name says it, or it is not known
   int rotor = -1;
   double p_value = 1;

@@ -193,7 +193,7 @@ class Page {
 
   void add_unknown(const UnknownStructure& unknown, Json& list) const {
     for (const Curve& curve : explanation_.model.curves) {
-      if (curve.covariate != unknown.covariate || curve.rotor != unknown.rotor || curve.x.size() == 0)
+      if (curve.covariate != unknown.condition || curve.rotor != unknown.rotor || curve.x.size() == 0)
         continue;
       MatrixXd shape = MatrixXd::Zero(observations_.rows(), observations_.channels());
       for (Index row = 0; row < shape.rows(); ++row)
@@ -202,9 +202,8 @@ class Page {
             shape(row, c) = unknown.levels
                                 ? at_level(unknown.shape, curve.x(row, 0), curve.levels[0])
                                 : interpolated(unknown.shape, curve.x(row, curve.x.cols() > 1 ? c : 0));
-      // Time of day is drawn by what the curve is of: hours since the session's first run.
-      const std::string name = curve.covariate == "start_utc" ? "hours_in_session" : curve.covariate;
-      list.push_back(panel("unknown: " + curve.label(), name, curve.x, curve.rotor, visible(shape)));
+      list.push_back(
+          panel("unknown: " + curve.label(), curve.covariate, curve.x, curve.rotor, visible(shape)));
       return;
     }
     if (unknown.covariate == "session") {

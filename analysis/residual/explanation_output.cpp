@@ -193,7 +193,9 @@ std::string explanation_text(const Explanation& e) {
     if (a.separating_run) text += fmt::format("    would tell: {}\n", a.separating_run->text);
   }
   for (const UnknownStructure& u : e.unknown) {
-    text += fmt::format("\n  unknown: depends on {}{}, amplitude {:.3g}{}, p = {:.3g}\n", u.covariate,
+    const bool plain = u.covariate_unit.empty() || u.covariate_unit == "1";
+    text += fmt::format("\n  unknown: depends on {}{}{}, amplitude {:.3g}{}, p = {:.3g}\n", u.covariate,
+                        plain ? "" : " [" + u.covariate_unit + "]",
                         u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit,
                         u.p_value);
     if (u.levels) text += wrapped("  " + levels_in_words(u, unit));

@@ -146,7 +146,8 @@ void add_raw_covariates(const Source& source, Observations& result) {
       lines([](std::string_view name) { return name == "shaft" || name == "blade_pass"; }));
 }
 
-/// Hours since the session's first run, the run's number, and the trend of the air's temperature.
+/// Hours since the session's first run, hour of the day, the run's number, and the trend of the air's
+/// temperature.
 void add_derived_covariates(const Source& source, Observations& result) {
   const Index n = source.rows();
   std::vector<double> first(result.block_name.size(), std::numeric_limits<double>::infinity());
@@ -156,14 +157,17 @@ void add_derived_covariates(const Source& source, Observations& result) {
       first[static_cast<std::size_t>(block - result.block_name.begin())] =
           std::min(first[static_cast<std::size_t>(block - result.block_name.begin())], run.start_s);
   }
-  Covariate hours{"hours_in_session", MatrixXd(n, 1), true}, order{"run_order", MatrixXd(n, 1), true};
+  Covariate hours{"hours_in_session", MatrixXd(n, 1), true, "h of the session"},
+      day{"hour_of_day", MatrixXd(n, 1), true, "h of the day"}, order{"run_order", MatrixXd(n, 1), true};
   for (Index row = 0; row < n; ++row) {
     hours.value(row, 0) = (source.run(row).start_s -
                            first[static_cast<std::size_t>(result.block[static_cast<std::size_t>(row)])]) /
                           3600;
+    day.value(row, 0) = std::fmod(source.run(row).start_s, 86400) / 3600;
     order.value(row, 0) = static_cast<double>(row);
   }
   result.covariates.push_back(hours);
+  result.covariates.push_back(day);
   result.covariates.push_back(order);
   const Covariate* air = result.find("air_temperature_C");
   if (air == nullptr) return;

@@ -16,7 +16,6 @@ const suffixes = {
   _m: 'm'
 };
 const plainUnits = {
-  hours_in_session: 'h',
   relative_humidity: '–',
   run_order: '–',
   session: '–',

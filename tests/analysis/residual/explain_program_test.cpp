@@ -22,7 +22,7 @@ using testing::HasSubstr;
 
 /// One run of a simulated campaign; `extra` are further cells of runs.csv.
 struct SimulatedRun {
-  int number = 0, session = 0;
+  int number = 0, session = 0, hour = 0;  // the latter of the day
   double supply_voltage_V = 16, air_temperature_C = 20;
   double thrust_factor = 1, first_rotor_factor = 1;
   std::string extra;
@@ -31,6 +31,8 @@ struct SimulatedRun {
 struct ExplainProgram : testing::Test {
   test::TemporaryFolder folder;
   std::mt19937_64 random{test::seed()};
+
+  std::function<int(int session)> first_hour = [](int) { return 8; };
 
   double normal(double sigma) { return std::normal_distribution<double>(0, sigma)(random); }
 
@@ -45,14 +47,14 @@ struct ExplainProgram : testing::Test {
     for (int session = 0; session < sessions; ++session) {
       const double offset = normal(0.001);
       for (int i = 0; i < 9; ++i, ++number) {
-        SimulatedRun run{.number = number, .session = session};
+        SimulatedRun run{.number = number, .session = session, .hour = first_hour(session) + i};
         run.supply_voltage_V = 16 + std::uniform_real_distribution<double>(-0.5, 0.5)(random);
         change(run);
         const double density = 293.15 / (run.air_temperature_C + 273.15);
         const char* location[] = {"OT", "H1V1", "H2V0"};
         campaign.runs_csv +=
             fmt::format("R{:03},{},{},S{:02},2026-03-{:02}T{:02}:00:00Z,,5000,{:.2f},{:.4f}{}", number + 1,
-                        location[i % 3], number / 3 + 1, session + 1, session + 1, 8 + i,
+                        location[i % 3], number / 3 + 1, session + 1, session + 1, run.hour,
                         run.air_temperature_C, run.supply_voltage_V, run.extra);
         for (int rotor = 0; rotor < 4; ++rotor)
           campaign.runs_csv += fmt::format(",{:.5f}", 7 * density * run.thrust_factor *
@@ -135,9 +137,24 @@ TEST_F(ExplainProgram, AColumnOfTextsIsACondition) {
 
   const ProgramResult reduced = run("reduce --db c.db");
   EXPECT_EQ(reduced.code, 1) << reduced.error;
-  EXPECT_THAT(reduced.error, HasSubstr("R051 is left out: its battery is none that the adopted curve over battery"));
+  EXPECT_THAT(reduced.error,
+              HasSubstr("R051 is left out: its battery is none that the adopted curve over battery"));
   const json again = explained("--response c_t");
   EXPECT_EQ(again["unknown"][0]["covariate"], "battery") << "explain holds measurements against the thesis";
+}
+
+TEST_F(ExplainProgram, TheHourOfTheDayIsToldFromTheHourOfTheSession) {
+  first_hour = [](int session) { return 1 + session * 5 % 13; };
+  write_campaign(14, "", [](SimulatedRun& run) { run.thrust_factor = 1 + 0.006 * std::sin(run.hour / 3.0); });
+  import_campaign();
+  const json e = explained("--adopt-empirical");
+  EXPECT_EQ(e["verdict"], "unknown") << text;
+  ASSERT_GE(e["unknown"].size(), 1u);
+  EXPECT_EQ(e["unknown"][0]["covariate"], "start_utc") << "the column that it is made of";
+  EXPECT_EQ(e["unknown"][0]["covariate_unit"], "h of the day");
+  EXPECT_NEAR(e["unknown"][0]["amplitude"], 7 * 0.006, 0.015);
+  EXPECT_THAT(text, HasSubstr("start_utc [h of the day]"));
+  EXPECT_EQ(run("reduce --db c.db").code, 0);
 }
 
 TEST_F(ExplainProgram, ARunWithARotorThatPushesIsLeftOutAndSaid) {

@@ -210,7 +210,7 @@ TEST_F(ExplainTest, AValueThatTwoBlocksHaveIsNotToldFromTheirScatter) {
   for (const Curve& curve : curves_to_try(o, o.all_rows())) EXPECT_NE(curve.covariate, "fan_on");
   EXPECT_THAT(
       explained(o).warnings,
-      Contains("fan_on has no two to eight values that are in three blocks each: nothing can be found "
+      Contains("fan_on has no two to twelve values that are in three blocks each: nothing can be found "
                "that follows it"));
 }
 
