@@ -66,8 +66,7 @@ std::string unseen(const Observations& observations, const Covariate& covariate,
   const int values = different_values(covariate, rows);
   if (values == 1) return texts ? "" : fmt::format("is the same in every {}", table ? "row" : "run");
   if (!varies_within_groups(observations, covariate))
-    return fmt::format("does not vary within any {}, whose own coefficient absorbs what follows it",
-                       table ? "group" : "location");
+    return fmt::format("does not vary within any {}", table ? "group" : "location");
   if ((texts || values == 2) && levels_of(observations, covariate, rows).empty())
     return "has no two to twelve values that are in three blocks each";
   return "";
@@ -123,6 +122,30 @@ void report_untestable(const Observations& observations, const std::vector<const
   explanation.untestable = untestable_effects(observations, effects, rows);
   warn_of_unseen(observations, rows, explanation);
   warn_of_collinear(observations, explanation);
+}
+
+void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation) {
+  if (observations.from_table) return;  // whose rows need not be in order of time
+  const auto changes_at = [&](const Covariate& covariate, Index first) {
+    const std::set<double> before(covariate.value.data(), covariate.value.data() + first);
+    return std::all_of(covariate.value.data() + first, covariate.value.data() + covariate.value.rows(),
+                       [&](double value) { return !before.contains(value); });
+  };
+  for (const AdoptedEffect& adopted : explanation.adopted)
+    for (const ParameterEstimate& point : adopted.parameters) {
+      if (point.run.empty()) continue;
+      for (const Covariate& covariate : observations.covariates) {
+        if (covariate.derived || covariate.per_channel() || !covariate.value.allFinite()) continue;
+        const auto most = std::min(static_cast<Index>(point.high), observations.rows() - 1);
+        for (Index first = std::max(static_cast<Index>(point.low), Index{1}); first <= most; ++first) {
+          if (!changes_at(covariate, first)) continue;
+          explanation.warnings.push_back(fmt::format(
+              "{} changes at run {}, where {} may have happened as well: it may be what changed",
+              covariate.name, observations.name[static_cast<std::size_t>(first)], adopted.term.label()));
+          break;
+        }
+      }
+    }
 }
 
 void warn_of_run_correlation(const Observations& observations, Explanation& explanation) {

@@ -259,6 +259,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   explanation.suspect_rows =
       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
   warn_of_alike_rows(observations, explanation);
+  warn_of_changes_at_steps(observations, explanation);
   explanation.verdict = verdict_of(explanation);
   return explanation;
 }

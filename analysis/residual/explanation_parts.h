@@ -12,6 +12,9 @@ namespace tunnelrig {
 void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
                        const std::vector<int>& rows, Explanation& explanation);
 
+/// Conditions that change once and for all where an adopted step may be: another battery, other blades.
+void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation);
+
 /// Neighbouring runs that resemble each other, as the search found and allowed for.
 void warn_of_run_correlation(const Observations& observations, Explanation& explanation);
 

@@ -143,6 +143,18 @@ TEST_F(ExplainProgram, AColumnOfTextsIsACondition) {
   EXPECT_EQ(again["unknown"][0]["covariate"], "battery") << "explain holds measurements against the thesis";
 }
 
+TEST_F(ExplainProgram, WhatChangesWithAStepIsSaid) {
+  write_campaign(14, ",battery", [](SimulatedRun& run) {
+    run.extra = run.session < 7 ? ",A" : ",B";
+    if (run.session >= 7) run.thrust_factor = 0.98;
+  });
+  import_campaign();
+  const json e = explained();
+  ASSERT_EQ(e["adopted"].size(), 1u) << text;
+  EXPECT_EQ(e["adopted"][0]["effect"], "propeller_step");
+  EXPECT_THAT(warnings, HasSubstr("battery changes at run R064, where propeller_step may have happened"));
+}
+
 TEST_F(ExplainProgram, TheHourOfTheDayIsToldFromTheHourOfTheSession) {
   first_hour = [](int session) { return 1 + session * 5 % 13; };
   write_campaign(14, "", [](SimulatedRun& run) { run.thrust_factor = 1 + 0.006 * std::sin(run.hour / 3.0); });

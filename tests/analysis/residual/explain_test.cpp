@@ -220,7 +220,7 @@ TEST_F(ExplainTest, AConditionThatOnlyLocationsDifferByIsSaid) {
   for (const int row : o.all_rows()) height.value(row, 0) = 0.5 + o.group[static_cast<std::size_t>(row)];
   o.covariates.push_back(height);
   EXPECT_THAT(explained(o).warnings,
-              Contains(HasSubstr("stand_height_m does not vary within any location, whose own coefficient")));
+              Contains(HasSubstr("stand_height_m does not vary within any location: nothing")));
 }
 
 /// A trend that bends: the best formula of the library takes the trend, and is not what the covariate does.
