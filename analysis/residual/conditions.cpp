@@ -59,26 +59,30 @@ bool varies_within_groups(const Observations& observations, const Covariate& cov
   return false;
 }
 
-/// Why nothing can be found that follows a condition; empty where something can.
-std::string unseen(const Observations& observations, const Covariate& covariate,
-                   const std::vector<int>& rows) {
+/// Why nothing can be found that follows a condition; empty where something can. `named`: an effect has it.
+std::string unseen(const Observations& observations, const Covariate& covariate, const std::vector<int>& rows,
+                   bool named) {
   const bool texts = !covariate.labels.empty(), table = observations.from_table;
   const int values = different_values(covariate, rows);
   if (values == 1) return texts ? "" : fmt::format("is the same in every {}", table ? "row" : "run");
   if (!varies_within_groups(observations, covariate))
     return fmt::format("does not vary within any {}", table ? "group" : "location");
-  if ((texts || values == 2) && levels_of(observations, covariate, rows).empty())
-    return "has no two to twelve values that are in three blocks each";
+  if ((texts || (values == 2 && !named)) && levels_of(observations, covariate, rows).empty())
+    return "has fewer than two values that three blocks have, or more than twelve";
   return "";
 }
 
-void warn_of_unseen(const Observations& observations, const std::vector<int>& rows,
-                    Explanation& explanation) {
+void warn_of_unseen(const Observations& observations, const std::vector<const Effect*>& effects,
+                    const std::vector<int>& rows, Explanation& explanation) {
   for (const Covariate& covariate : observations.covariates) {
     if (covariate.derived || covariate.per_channel() || observations.not_usable.contains(covariate.name) ||
         observations.assumed.contains(covariate.name) || covariate.value.array().isNaN().any())
       continue;
-    const std::string why = unseen(observations, covariate, rows);
+    const bool named = std::any_of(effects.begin(), effects.end(), [&](const Effect* effect) {
+      const auto& names = effect->covariates;
+      return std::find(names.begin(), names.end(), covariate.name) != names.end();
+    });
+    const std::string why = unseen(observations, covariate, rows, named);
     if (!why.empty())
       explanation.warnings.push_back(
           fmt::format("{} {}: nothing can be found that follows it", covariate.name, why));
@@ -120,11 +124,12 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
 void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
                        const std::vector<int>& rows, Explanation& explanation) {
   explanation.untestable = untestable_effects(observations, effects, rows);
-  warn_of_unseen(observations, rows, explanation);
+  warn_of_unseen(observations, effects, rows, explanation);
   warn_of_collinear(observations, explanation);
 }
 
 void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation) {
+  constexpr int kMostValues = 4;        // what changes all the time changes there as well
   if (observations.from_table) return;  // whose rows need not be in order of time
   const auto changes_at = [&](const Covariate& covariate, Index first) {
     const std::set<double> before(covariate.value.data(), covariate.value.data() + first);
@@ -135,7 +140,9 @@ void warn_of_changes_at_steps(const Observations& observations, Explanation& exp
     for (const ParameterEstimate& point : adopted.parameters) {
       if (point.run.empty()) continue;
       for (const Covariate& covariate : observations.covariates) {
-        if (covariate.derived || covariate.per_channel() || !covariate.value.allFinite()) continue;
+        if (covariate.derived || covariate.per_channel() || !covariate.value.allFinite() ||
+            different_values(covariate, observations.all_rows()) > kMostValues)
+          continue;
         const auto most = std::min(static_cast<Index>(point.high), observations.rows() - 1);
         for (Index first = std::max(static_cast<Index>(point.low), Index{1}); first <= most; ++first) {
           if (!changes_at(covariate, first)) continue;

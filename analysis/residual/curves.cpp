@@ -149,10 +149,6 @@ std::vector<double> levels_of(const Observations& observations, const Covariate&
   return levels;
 }
 
-std::string reported_name(const std::string& covariate) {
-  return covariate == "hours_in_session" || covariate == "hour_of_day" ? "start_utc" : covariate;
-}
-
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows) {
   std::vector<int> rotors = {-1};
   for (int rotor = 0; rotor < static_cast<int>(observations.channels()) && observations.channels() > 1;
@@ -172,7 +168,8 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
                           .levels = levels,
                           .labels = covariate.labels});
     if (!covariate.labels.empty()) continue;
-    if (covariate.name == "hour_of_day" && repeats_another(observations, covariate)) continue;
+    if (covariate.derived && covariate.name == "hour_of_day" && repeats_another(observations, covariate))
+      continue;
     const int most = different_values(covariate, rows) / 3;
     const auto add = [&](CurveShape shape, int count) {
       for (const int rotor : rotors)

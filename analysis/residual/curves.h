@@ -43,9 +43,6 @@ Curve without_trend(const Curve& curve, const std::vector<int>& rows);
 /// A curve without its straight part that has to do all of the covariate's work: the same with it.
 Curve with_trend(const Curve& curve);
 
-/// The column of runs.csv that a covariate is made of: "start_utc" of both kinds of hours.
-std::string reported_name(const std::string& covariate);
-
 /// Whether one of these covariates is what the curve is over.
 bool is_over(const Curve& curve, const std::vector<std::string>& covariates);
 

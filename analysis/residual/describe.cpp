@@ -53,7 +53,7 @@ std::vector<Drawn> drawn_curve(const Curve& curve, double low, double high) {
 
 UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
                           const std::vector<int>& rows) {
-  UnknownStructure result{.covariate = reported_name(found.curve.covariate),
+  UnknownStructure result{.covariate = found.curve.covariate,
                           .condition = found.curve.covariate,
                           .covariate_unit = {},
                           .rotor = found.curve.rotor,
@@ -62,8 +62,12 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
                           .levels = found.curve.shape == CurveShape::kLevels,
                           .labels = found.curve.labels,
                           .instead_of = found.instead_of};
-  if (const Covariate* covariate = observations.find(result.condition))
+  if (const Covariate* covariate = observations.find(result.condition)) {
     result.covariate_unit = covariate->unit;
+    // The column that both kinds of hours are made of.
+    if (covariate->derived && (covariate->name == "hours_in_session" || covariate->name == "hour_of_day"))
+      result.covariate = "start_utc";
+  }
   const Components y = difference(response_components(observations), fit.linear.offset);
   const AmplitudeFit amplitudes = fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);
   Index first = static_cast<Index>(fit.linear.columns.size());

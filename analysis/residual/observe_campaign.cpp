@@ -166,8 +166,8 @@ void add_derived_covariates(const Source& source, Observations& result) {
     day.value(row, 0) = std::fmod(source.run(row).start_s, 86400) / 3600;
     order.value(row, 0) = static_cast<double>(row);
   }
-  result.covariates.push_back(hours);
-  result.covariates.push_back(day);
+  for (const Covariate& time : {hours, day})
+    if (result.find(time.name) == nullptr) result.covariates.push_back(time);
   result.covariates.push_back(order);
   const Covariate* air = result.find("air_temperature_C");
   if (air == nullptr) return;
