@@ -40,7 +40,8 @@ std::vector<std::string> reduced_effects() {
 }
 
 std::vector<std::string> made_up_effects() {
-  return {"humidity_wave", "voltage_band", "time_of_day_arch", "temperature_kink", "cable_wave"};
+  return {"humidity_wave", "voltage_band", "time_of_day_arch", "temperature_kink",
+          "cable_wave",    "fan_switch",   "blade_sets"};
 }
 
 std::string files_of(const std::filesystem::path& folder) {
@@ -112,6 +113,23 @@ TEST(Generator, EffectsHaveTheSizeAskedFor) {
     const Campaign campaign = generate({.track = Track::kOutside, .effects = {effect}, .seed = test::seed()});
     EXPECT_NEAR(campaign.effects.front().rms_over_level, 1, 0.02) << effect;
     EXPECT_FALSE(campaign.effects.front().effect.in_library) << effect;
+  }
+}
+
+TEST(Generator, SwitchesChangeNothingElse) {
+  const TemporaryFolder folder;
+  const auto written = [&](bool switches, const char* name) {
+    write_folder(generate({.track = Track::kNone, .seed = test::seed(), .switches = switches}),
+                 folder / name);
+    return parse_csv(read_text(folder / name / "runs.csv"), "runs.csv");
+  };
+  const Sheet without = written(false, "without"), with = written(true, "with");
+  EXPECT_FALSE(without.find("fan_on"));
+  ASSERT_TRUE(with.find("fan_on"));
+  for (std::size_t row = 0; row < with.rows.size(); ++row) {
+    EXPECT_EQ(with.text(row, "thrust_3_N"), without.text(row, "thrust_3_N"));
+    EXPECT_THAT(with.text(row, "fan_on"), testing::AnyOf("0", "1"));
+    EXPECT_THAT(with.text(row, "blade_set"), testing::AnyOf("A", "B", "C"));
   }
 }
 

@@ -39,7 +39,7 @@ def cells_of_the_table():
 
 
 def cells_around_it():
-    """Other sizes, orders, numbers of blocks and runs, gaps in what was written down, raw campaigns."""
+    """Other sizes, orders, numbers of blocks and runs, gaps in what was written down, switches and texts, raw campaigns."""
     for noise in NOISES:
         for size in (0.25, 2, 4):
             yield cell("one", noise, size)
@@ -52,6 +52,8 @@ def cells_around_it():
         yield cell("one", noise, 1, runs=430)
         yield cell("none", noise, 1, options=["--unequal-repeats", "--missing-cells"])
         yield cell("one", noise, 1, options=["--unequal-repeats"])
+        for track in ("none", "outside"):
+            yield cell(track, noise, 1, options=["--switches"])
         yield cell("none", noise, 1, options=["--raw"])
         yield cell("one", noise, 1, options=["--raw"])
 

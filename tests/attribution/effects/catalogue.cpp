@@ -8,15 +8,17 @@
 namespace tunnelrig::attribution {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, Effect (*)(Random&)>, 29> kEffects = {{
+constexpr std::array<std::pair<std::string_view, Effect (*)(Random&)>, 31> kEffects = {{
     {"adc_clipping", adc_clipping},
     {"air_humidity", air_humidity},
     {"air_pressure", air_pressure},
     {"axial_wind", axial_wind},
+    {"blade_sets", blade_sets},
     {"cable_wave", cable_wave},
     {"ceiling_effect", ceiling_effect},
     {"creep", creep},
     {"crosstalk", crosstalk},
+    {"fan_switch", fan_switch},
     {"ground_effect", ground_effect},
     {"humidity_wave", humidity_wave},
     {"hysteresis", hysteresis},

@@ -37,7 +37,9 @@ Effect mains_pickup(Random& random);
 Effect vibration_alias(Random& random);
 
 // Made up: no name in anybody's list fits them.
+Effect blade_sets(Random& random);
 Effect cable_wave(Random& random);
+Effect fan_switch(Random& random);
 Effect humidity_wave(Random& random);
 Effect temperature_kink(Random& random);
 Effect time_of_day_arch(Random& random);

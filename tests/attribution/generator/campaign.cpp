@@ -98,6 +98,9 @@ Campaign generate(const Settings& settings) {
   check(settings);
   Campaign campaign{.settings = settings};
   draw_effects(campaign, attempt_that_shows(settings));
+  for (const Sized& one : campaign.effects)
+    for (const std::string& column : one.effect.covariates)
+      campaign.settings.switches |= column == "fan_on" || column == "blade_set";
   for (Sized& one : campaign.effects) measure(one, campaign.world, campaign.noise, campaign.open_space);
   campaign.floor = noise_floor(campaign.noise, campaign.world);
   campaign.scatter = draw_noise(campaign.noise, campaign.world, settings.seed);

@@ -197,6 +197,18 @@ Rotors coefficients(const Design& design, Random& random) {
   return values;
 }
 
+/// What people do at the rig between runs. Every campaign has it; not every one writes it down.
+void switch_about(World& world, Random& random) {
+  double fan_on = 0;
+  std::size_t blade_set = 0;
+  for (Conditions& run : world.runs) {
+    if (random.chance(0.3)) fan_on = 1 - fan_on;
+    if (random.chance(0.3)) blade_set = random.below(kBladeSets);
+    run.fan_on = fan_on;
+    run.blade_set = blade_set;
+  }
+}
+
 void lay_baseline(World& world, const Design& design, Random& random) {
   std::map<std::string, Rotors> known;
   const bool one_for_all = design.places == Design::Places::kOpenSpace;
@@ -243,6 +255,8 @@ World plan_world(const Settings& settings, const Design& design) {
     world.runs.push_back(run);
   }
   if (!settings.separating.empty()) add_separating_sessions(world, settings, rig, days);
+  Random switches(settings.seed, "switches");
+  switch_about(world, switches);
   lay_baseline(world, design, field);
   return world;
 }

@@ -92,6 +92,8 @@ int main(int argc, char** argv) {
   app.add_option("--seed", settings.seed, "Of everything that is drawn")->capture_default_str();
   app.add_flag("--unequal-repeats", settings.unequal_repeats, "Locations are repeated unevenly");
   app.add_flag("--missing-cells", settings.missing_cells, "One covariate lacks a value here and there");
+  app.add_flag("--switches", settings.switches,
+               "A switch and a column of texts are written down; what is true outside the library is theirs");
   app.add_flag("--raw", settings.raw, "Arrays of counts instead of thrusts");
   app.add_option("--raw-duration", settings.raw_duration_s, "Seconds of each raw run")->capture_default_str();
   app.add_option("--separate", options.separate,

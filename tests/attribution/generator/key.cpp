@@ -51,6 +51,7 @@ ordered_json design_json(const Campaign& campaign) {
           {"thrust_spread", campaign.truth.design.thrust_spread},
           {"unequal_repeats", settings.unequal_repeats},
           {"missing_cells", settings.missing_cells},
+          {"switches", settings.switches},
           {"raw", settings.raw}};
 }
 

@@ -37,7 +37,8 @@ struct Settings {
   std::uint64_t seed = 1;
   bool unequal_repeats = false;
   bool missing_cells = false;
-  bool raw = false;  // arrays of counts instead of thrusts
+  bool switches = false;  // runs.csv has a switch and a column of texts, and they are what is true outside
+  bool raw = false;       // arrays of counts instead of thrusts
   double raw_duration_s = 6;
   std::vector<SeparatingRun> separating;
 

@@ -39,6 +39,9 @@ constexpr std::array kForTwo = {"air_pressure", "rotor_speed", "supply_voltage",
 constexpr std::array kOutside = {"humidity_wave", "voltage_band", "time_of_day_arch", "temperature_kink",
                                  "cable_wave"};
 
+/// The same where switches and texts are written down.
+constexpr std::array kSwitched = {"fan_switch", "blade_sets"};
+
 struct Pair {
   const char* truth;
   const char* other;
@@ -186,7 +189,8 @@ Truth draw_truth(const Settings& settings, int attempt) {
     case Track::kConfounded:
       return draw_confounded(settings, random);
     case Track::kOutside:
-      return draw_single(settings, kOutside, random);
+      return settings.switches ? draw_single(settings, kSwitched, random)
+                               : draw_single(settings, kOutside, random);
     case Track::kNotRecorded:
       return draw_hidden(settings, random);
   }

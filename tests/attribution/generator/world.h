@@ -20,6 +20,7 @@ inline constexpr double kGasConstant_J_kgK = 287.058;
 inline constexpr double kZero_V = 0.34;
 inline constexpr double kGain_V_N = 0.242;
 inline constexpr double kFullScale_V = 3.3 * 4095 / 4096;
+inline constexpr std::size_t kBladeSets = 3;
 inline constexpr double kFar_R = std::numeric_limits<double>::infinity();
 
 /// One run. Members that end up in a column of runs.csv have the column's name.
@@ -37,6 +38,8 @@ struct Conditions {
   double supply_voltage_V = 15, tunnel_airspeed_m_s = 0, cell_temperature_C = 22;
   double time_since_motor_start_s = 60;
   double time_of_day_h = 12, cable_slack_mm = 0;  // columns of a laboratory's own
+  double fan_on = 0;                              // 0 or 1
+  std::size_t blade_set = 0;                      // which of kBladeSets; a letter in runs.csv
   double speed_factor = 1;  // thrust of a speed that was chosen, over that of the nominal speed
   bool added = false;       // of a session that was added to tell two effects apart
   bool proposed = false;    // brought to a setting that shall tell two effects apart

@@ -44,6 +44,10 @@ std::vector<Column> covariates(const Campaign& campaign) {
     all.push_back(distance("ground_distance_R", &Conditions::ground_distance_R));
     all.push_back(distance("ceiling_distance_R", &Conditions::ceiling_distance_R));
   }
+  if (campaign.settings.switches) {
+    all.push_back(column("fan_on", &Conditions::fan_on, 0));
+    all.push_back({"blade_set", [](const Conditions& run) { return std::string(1, "ABC"[run.blade_set]); }});
+  }
   std::erase_if(all, [&](const Column& one) {
     const auto& hidden = campaign.truth.unrecorded;
     return std::find(hidden.begin(), hidden.end(), one.name) != hidden.end();
