@@ -119,14 +119,15 @@ std::vector<std::string> unread_keys(const toml::table& document,
                                      std::initializer_list<const Section*> sections,
                                      const std::string& file) {
   std::vector<std::string> unread;
-  for (const auto& [name, node] : document) {
+  for (const auto& [key, node] : document) {
     if (!node.is_table()) continue;
+    const std::string_view name = key.str();
     const auto section = std::find_if(sections.begin(), sections.end(),
-                                      [&](const Section* s) { return s->name() == name.str(); });
+                                      [name](const Section* s) { return s->name() == name; });
     if (section != sections.end())
       (*section)->tell_unread(unread);
     else
-      unread.push_back(fmt::format("{}:{}: nothing reads [{}]", file, name.source().begin.line, name.str()));
+      unread.push_back(fmt::format("{}:{}: nothing reads [{}]", file, key.source().begin.line, name));
   }
   return unread;
 }
