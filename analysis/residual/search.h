@@ -92,6 +92,9 @@ class Search {
   bool add_best_curve(const CurveScan& curves);
   /// A name whose work a curve does as well was the wrong name for that curve.
   void drop_what_a_curve_replaces();
+  /// Whether effect t is beyond chance among all candidates with the curves in: what was found while their
+  /// structure was in the residual may have been a part of it. `without`: the fit without it.
+  bool is_still_found(std::size_t t, const JointFit& without);
   /// Whether the newest curve, over a covariate of this effect, has more of the effect's size than its
   /// formula may leave: then the effect was only the curve's straight part.
   bool outshone_by_curve(const Term& term) const;

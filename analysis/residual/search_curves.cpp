@@ -12,7 +12,6 @@
 namespace tunnelrig {
 namespace {
 
-constexpr double kKeptP = 0.01;  // an effect stays beside a curve only if its own p is below
 /// A formula that leaves more than this of its own size, rms, as a curve over its own covariate is not what
 /// the covariate does. One with a time constant or a length can bend towards the curve, and must do less than
 /// it.
@@ -138,13 +137,22 @@ void Search::drop_what_a_curve_replaces() {
     if (result_.accepted[t].term.per_group) continue;  // stands in the baseline
     const bool outshone = outshone_by_curve(result_.accepted[t].term);
     const JointFit without = fit_without(t);
-    const double ratio = std::max(0.0, fit_.variances.log_likelihood - without.variances.log_likelihood);
-    if (ratio_p(ratio, fit_) < kKeptP && !at_bound(fit_, result_.accepted[t].term) && !outshone) continue;
+    if (!outshone && !at_bound(fit_, result_.accepted[t].term) && is_still_found(t, without)) continue;
     if (outshone)
       give_way_to_curve(t, without);
     else
       drop(t, without);
   }
+}
+
+bool Search::is_still_found(std::size_t t, const JointFit& without) {
+  const auto at = static_cast<std::ptrdiff_t>(t);
+  const Accepted own = result_.accepted[t];
+  result_.accepted.erase(result_.accepted.begin() + at);
+  const Scan scan = scan_effects(without);
+  result_.accepted.insert(result_.accepted.begin() + at, own);
+  NullMaxima maxima(*scan.scan, without.variances, settings_, 4000 + ++salt_);
+  return maxima.p(evidence_of(scan, own.term)) <= settings_.alpha;
 }
 
 void Search::drop(std::size_t t, const JointFit& without) {

@@ -163,7 +163,7 @@ def chosen_cells(options):
         cells += list(cells_around_it())
     keep = lambda one, given, key: not given or one[key] in given
     return [one for one in cells
-            if keep(one, options.track, "track") and keep(one, options.noise, "noise") and
+            if options.only in name_of(one) and keep(one, options.track, "track") and keep(one, options.noise, "noise") and
             keep(one, options.blocks, "blocks") and keep(one, options.size, "size")]
 
 
@@ -222,6 +222,7 @@ def parse_arguments():
     parser.add_argument("--noise", action="append", choices=NOISES)
     parser.add_argument("--blocks", action="append", type=int)
     parser.add_argument("--size", action="append", type=float)
+    parser.add_argument("--only", default="", metavar="TEXT", help="cells whose name holds it, of track/noise/size/blocks/order/runs/options")
     parser.add_argument("--around", action="store_true", help="also cells beyond the table: " + cells_around_it.__doc__)
     parser.add_argument("--smoke", action="store_true", help="a few campaigns, for the tests")
     parser.add_argument("--jobs", type=int, default=2)
