@@ -8,8 +8,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <optional>
+#include <utility>
 
 namespace tunnelrig {
 namespace {
@@ -53,6 +55,7 @@ class UsbSource : public PacketSource {
 
   ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds timeout) override {
     if (!rest_.empty()) return read_rest(buffer);
+    if (break_cause_ != nullptr) return broken();
     if (!stream_) return {ReadResult::Status::kBroken, 0, steady_seconds()};
     const UsbStream::Got got = stream_->read(buffer, timeout);
     if (got.status == UsbStream::Status::kData) {
@@ -60,10 +63,10 @@ class UsbSource : public PacketSource {
       if (got.time_s >= next_statistics_s_) ask_for_statistics(got.time_s);
       return {ReadResult::Status::kData, got.size, got.time_s, got.cause};
     }
-    if (got.status == UsbStream::Status::kBroken) return broken(got.cause);
+    if (got.status == UsbStream::Status::kBroken) return break_off(got.cause, buffer);
     // Waits are counted, not the clock: a program that was held up finds its bytes waiting.
     silent_ += timeout;
-    if (silent_ >= silence_limit_) return broken("silent");
+    if (silent_ >= silence_limit_) return break_off("silent", buffer);
     return {ReadResult::Status::kNothing, 0, got.time_s};
   }
 
@@ -76,11 +79,16 @@ class UsbSource : public PacketSource {
   }
 
  private:
+  /// With the time at which they came: how long a break was is judged by it.
   ReadResult read_rest(std::span<std::byte> buffer) {
-    const std::size_t size = std::min(buffer.size(), rest_.size());
-    std::copy_n(rest_.begin(), size, buffer.begin());
-    rest_.erase(rest_.begin(), rest_.begin() + static_cast<std::ptrdiff_t>(size));
-    return {ReadResult::Status::kData, size, steady_seconds()};
+    UsbStream::Unread& oldest = rest_.front();
+    const std::size_t size = std::min(buffer.size(), oldest.bytes.size());
+    std::copy_n(oldest.bytes.begin(), size, buffer.begin());
+    const ReadResult result{ReadResult::Status::kData, size, oldest.time_s,
+                            std::exchange(oldest.cause, nullptr)};
+    oldest.bytes.erase(oldest.bytes.begin(), oldest.bytes.begin() + static_cast<std::ptrdiff_t>(size));
+    if (oldest.bytes.empty()) rest_.pop_front();
+    return result;
   }
 
   /// The stream goes on meanwhile, into its queue. A board that does not answer is not asked again.
@@ -90,18 +98,20 @@ class UsbSource : public PacketSource {
     next_statistics_s_ = time_s + (statistics ? kStatistics_s : std::numeric_limits<double>::infinity());
   }
 
-  ReadResult broken(const char* cause) {
-    broken_ = true;
-    return {ReadResult::Status::kBroken, 0, steady_seconds(), cause};
+  /// What came before a break is read before the break is told: its cause belongs to the gap behind it. A
+  /// source that is silent may just have got something, too.
+  ReadResult break_off(const char* cause, std::span<std::byte> buffer) {
+    break_cause_ = cause;
+    for (UsbStream::Unread& unread : stream_->finish()) rest_.push_back(std::move(unread));
+    return rest_.empty() ? broken() : read_rest(buffer);
   }
 
-  /// What has come is kept for the next read: a source that is reopened because nothing came may just have
-  /// got something.
+  ReadResult broken() {
+    broken_ = true;
+    return {ReadResult::Status::kBroken, 0, steady_seconds(), std::exchange(break_cause_, nullptr)};
+  }
+
   void close() {
-    if (stream_) {
-      const std::vector<std::byte> rest = stream_->finish();
-      rest_.insert(rest_.end(), rest.begin(), rest.end());
-    }
     stream_.reset();
     board_.reset();
   }
@@ -161,7 +171,8 @@ class UsbSource : public PacketSource {
   std::shared_ptr<UsbBus> bus_;
   std::unique_ptr<UsbBoard> board_;
   std::unique_ptr<UsbStream> stream_;
-  std::vector<std::byte> rest_;  // of streams that were closed
+  std::deque<UsbStream::Unread> rest_;  // of a stream that broke
+  const char* break_cause_ = nullptr;   // of a break that is not told yet
   std::uint32_t boot_id_ = 0;
   std::chrono::milliseconds silent_{0}, silence_limit_{0};
   double next_statistics_s_ = 0;

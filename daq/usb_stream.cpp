@@ -212,12 +212,14 @@ UsbStream::Got UsbStream::read(std::span<std::byte> buffer, std::chrono::millise
   return got;
 }
 
-std::vector<std::byte> UsbStream::finish() {
+std::vector<UsbStream::Unread> UsbStream::finish() {
   stop();
   const std::lock_guard lock(state_->mutex);
-  std::vector<std::byte> rest;
-  for (const State::Chunk& chunk : state_->chunks)
-    rest.insert(rest.end(), chunk.bytes.begin() + static_cast<std::ptrdiff_t>(chunk.used), chunk.bytes.end());
+  std::vector<Unread> rest;
+  for (const State::Chunk& chunk : state_->chunks) {
+    const auto unread = std::span(chunk.bytes).subspan(chunk.used);
+    rest.push_back({{unread.begin(), unread.end()}, chunk.time_s, chunk.cause});
+  }
   state_->chunks.clear();
   return rest;
 }

@@ -35,12 +35,19 @@ class UsbStream {
   UsbStream(const UsbStream&) = delete;
   UsbStream& operator=(const UsbStream&) = delete;
 
+  /// Bytes that came in one transfer and that nobody has read.
+  struct Unread {
+    std::vector<std::byte> bytes;
+    double time_s = 0;            // when they came in
+    const char* cause = nullptr;  // what went wrong before them
+  };
+
   /// Waits for bytes, at most for `timeout` (and where the endpoint has to be cleared of a stall, 0.5 s
   /// more).
   Got read(std::span<std::byte> buffer, std::chrono::milliseconds timeout);
 
   /// Ends the stream; what has come and was not read. Waits at most for the settings' drain_wait.
-  std::vector<std::byte> finish();
+  std::vector<Unread> finish();
 
   /// Throws away what has come so far, until nothing came for `quiet`; back within 10 × `quiet`.
   void discard(std::chrono::milliseconds quiet);
