@@ -7,6 +7,7 @@
 #include "datasets/error.h"
 #include "datasets/sqlite.h"
 #include "datasets/statistics_store.h"
+#include "support/wall_clock.h"
 
 #include <csignal>
 #include <cstdlib>
@@ -68,7 +69,9 @@ TEST(Logger, UserMayStopARun) {
   user.join();
   EXPECT_EQ(outcome.state, RunState::kPartial);
   EXPECT_EQ(outcome.ledger.end_reason, "stopped by the user");
-  EXPECT_NEAR(static_cast<double>(outcome.ledger.frames_stored), 0.6 * kRate_hz, 0.3 * kRate_hz);
+  if (test::kClockCounts) {
+    EXPECT_NEAR(static_cast<double>(outcome.ledger.frames_stored), 0.6 * kRate_hz, 0.3 * kRate_hz);
+  }
 }
 
 TEST(Logger, ARunIsNotRecordedTwice) {
@@ -130,10 +133,11 @@ TEST(Logger, AKillCostsAtMostTheLastTenthOfASecond) {
     read_raw(file, run, list);
     for (std::size_t i = 0; i < list.count(); ++i) ASSERT_EQ(list.samples[4 * i], test::sample_of(i, 0));
     EXPECT_TRUE(ledger_of(file, run.id)->closed());
-    // 12 ms are one packet, which a board cannot send before it is full; the rest is scheduling on a busy
-    // machine.
-    EXPECT_GE(static_cast<double>(list.count()) / kRate_hz, lived_s - 0.100 - 0.012 - 0.050)
-        << "after " << lived_s << " s";
+    // 12 ms are one packet, which a board cannot send before it is full; the rest is scheduling.
+    if (test::kClockCounts) {
+      EXPECT_GE(static_cast<double>(list.count()) / kRate_hz, lived_s - 0.100 - 0.012 - 0.050)
+          << "after " << lived_s << " s";
+    }
   }
 }
 

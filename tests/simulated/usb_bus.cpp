@@ -160,13 +160,14 @@ void UsbBus::set_deaf(bool deaf) {
   deaf_ = deaf;
 }
 
-void UsbBus::fail_transfer(int error, bool keep) {
+bool UsbBus::fail_transfer(int error, bool keep) {
   const std::lock_guard lock(mutex_);
-  if (pending_.empty()) return;
+  if (pending_.empty()) return false;
   usbdevfs_urb* urb = pending_.front();
   pending_.pop_front();
   if (!keep) urb->actual_length = 0;
   complete(urb, -error);
+  return true;
 }
 
 void UsbBus::set_mangle(Mangle mangle) {

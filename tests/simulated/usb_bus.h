@@ -46,8 +46,8 @@ class UsbBus {
   void set_deaf(bool deaf);
 
   /// The oldest pending transfer ends with `error` (a positive errno); what it held already is `keep` or
-  /// lost.
-  void fail_transfer(int error, bool keep);
+  /// lost. False where none is pending.
+  bool fail_transfer(int error, bool keep);
 
   void set_mangle(Mangle mangle);
 
