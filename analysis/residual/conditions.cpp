@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <string_view>
 
@@ -95,14 +96,11 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
       const Covariate &first = observations.covariates[a], &second = observations.covariates[b];
       if ((first.derived && second.derived) || !first.labels.empty() || !second.labels.empty()) continue;
       if (first.value.array().isNaN().any() || second.value.array().isNaN().any()) continue;
-      const VectorXd u = first.value.col(0).array() - first.value.col(0).mean(),
-                     v = second.value.col(0).array() - second.value.col(0).mean();
-      if (u.norm() == 0 || v.norm() == 0) continue;
-      const double correlation = u.dot(v) / u.norm() / v.norm();
-      if (std::abs(correlation) < 0.999) continue;
+      const double together = correlation(first, second);
+      if (std::abs(together) < 0.999) continue;
       explanation.warnings.push_back(
           fmt::format("{} and {} go together (correlation {:.4f}): effects of the two cannot be told apart",
-                      first.name, second.name, correlation));
+                      first.name, second.name, together));
       for (const Effect& effect : all_effects())
         for (const std::string& covariate : effect.covariates)
           if (covariate == second.name || covariate == first.name)
@@ -119,6 +117,22 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
   explanation.untestable = std::move(once);
 }
 
+/// The first run of a change-point's interval from which on a condition has none of the values before it.
+std::optional<Index> changes_for_good(const Observations& observations, const Covariate& covariate,
+                                      const ParameterEstimate& point) {
+  constexpr int kMostValues = 4;  // what changes all the time changes there as well
+  if (covariate.derived || covariate.per_channel() || !covariate.value.allFinite() ||
+      different_values(covariate, observations.all_rows()) > kMostValues)
+    return {};
+  const auto begin = covariate.value.data(), end = begin + covariate.value.rows();
+  const Index most = std::min(static_cast<Index>(point.high), observations.rows() - 1);
+  for (Index first = std::max(static_cast<Index>(point.low), Index{1}); first <= most; ++first) {
+    const std::set<double> before(begin, begin + first);
+    if (std::none_of(begin + first, end, [&](double value) { return before.contains(value); })) return first;
+  }
+  return {};
+}
+
 }  // namespace
 
 void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
@@ -129,30 +143,17 @@ void report_untestable(const Observations& observations, const std::vector<const
 }
 
 void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation) {
-  constexpr int kMostValues = 4;        // what changes all the time changes there as well
   if (observations.from_table) return;  // whose rows need not be in order of time
-  const auto changes_at = [&](const Covariate& covariate, Index first) {
-    const std::set<double> before(covariate.value.data(), covariate.value.data() + first);
-    return std::all_of(covariate.value.data() + first, covariate.value.data() + covariate.value.rows(),
-                       [&](double value) { return !before.contains(value); });
-  };
   for (const AdoptedEffect& adopted : explanation.adopted)
-    for (const ParameterEstimate& point : adopted.parameters) {
-      if (point.run.empty()) continue;
+    for (const ParameterEstimate& point : adopted.parameters)
       for (const Covariate& covariate : observations.covariates) {
-        if (covariate.derived || covariate.per_channel() || !covariate.value.allFinite() ||
-            different_values(covariate, observations.all_rows()) > kMostValues)
-          continue;
-        const auto most = std::min(static_cast<Index>(point.high), observations.rows() - 1);
-        for (Index first = std::max(static_cast<Index>(point.low), Index{1}); first <= most; ++first) {
-          if (!changes_at(covariate, first)) continue;
+        const auto first =
+            point.run.empty() ? std::nullopt : changes_for_good(observations, covariate, point);
+        if (first)
           explanation.warnings.push_back(fmt::format(
               "{} changes at run {}, where {} may have happened as well: it may be what changed",
-              covariate.name, observations.name[static_cast<std::size_t>(first)], adopted.term.label()));
-          break;
-        }
+              covariate.name, observations.name[static_cast<std::size_t>(*first)], adopted.term.label()));
       }
-    }
 }
 
 void warn_of_run_correlation(const Observations& observations, Explanation& explanation) {

@@ -25,16 +25,17 @@ Components nothing(const Observations& observations) {
                     MatrixXd::Zero(observations.rows(), observations.channels()));
 }
 
+/// `count` columns on the curve's rotors; column_at(k, x), k from 1.
+template <class ColumnAt>
 std::vector<Components> columns_over(const Observations& observations, const Covariate& covariate, int rotor,
-                                     CurveShape shape, int count) {
-  const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff();
+                                     int count, const ColumnAt& column_at) {
   std::vector<Components> columns;
   for (int k = 1; k <= count; ++k) {
     columns.push_back(nothing(observations));
     for (Index row = 0; row < observations.rows(); ++row)
       for (Index channel = 0; channel < observations.channels(); ++channel)
         if (rotor < 0 || channel == rotor)
-          columns.back()[0](row, channel) = curve_column(shape, k, covariate.at(row, channel), low, high);
+          columns.back()[0](row, channel) = column_at(k, covariate.at(row, channel));
   }
   return columns;
 }
@@ -55,20 +56,6 @@ std::vector<CurveShape> bends_over(const Observations& observations, const Covar
                      covariate.value.minCoeff() > 0;
   if (ratio) return {CurveShape::kLogParabola, CurveShape::kLevelling};
   return {CurveShape::kParabola};
-}
-
-std::vector<Components> level_columns(const Observations& observations, const Covariate& covariate, int rotor,
-                                      const std::vector<double>& levels) {
-  std::vector<Components> columns;
-  for (std::size_t k = 1; k < levels.size(); ++k) {
-    columns.push_back(nothing(observations));
-    for (Index row = 0; row < observations.rows(); ++row)
-      for (Index channel = 0; channel < observations.channels(); ++channel)
-        if (rotor < 0 || channel == rotor)
-          columns.back()[0](row, channel) =
-              level_column(levels, static_cast<int>(k), covariate.value(row, 0));
-  }
-  return columns;
 }
 
 /// The widest part of the covariate's range without a row in it, over that range.
@@ -97,16 +84,10 @@ MatrixXd straight_over(const Curve& curve) {
 /// Whether another condition of the runs goes with it: sessions that all begin at one hour.
 bool repeats_another(const Observations& observations, const Covariate& covariate) {
   constexpr double kSame = 0.99;  // correlation
-  const auto centred = [](const Covariate& of) {
-    return Eigen::VectorXd(of.value.col(0).array() - of.value.col(0).mean());
-  };
-  const Eigen::VectorXd own = centred(covariate);
   return std::any_of(observations.covariates.begin(), observations.covariates.end(),
                      [&](const Covariate& other) {
-                       if (other.name == covariate.name || other.per_channel() || !other.value.allFinite())
-                         return false;
-                       const Eigen::VectorXd theirs = centred(other);
-                       return std::abs(own.dot(theirs)) > kSame * own.norm() * theirs.norm();
+                       return other.name != covariate.name && !other.per_channel() &&
+                              other.value.allFinite() && std::abs(correlation(covariate, other)) > kSame;
                      });
 }
 
@@ -114,6 +95,13 @@ bool repeats_another(const Observations& observations, const Covariate& covariat
 
 std::string Curve::label() const {
   return rotor < 0 ? covariate : covariate + fmt::format(" of rotor {}", rotor + 1);
+}
+
+double correlation(const Covariate& first, const Covariate& second) {
+  const Eigen::VectorXd u = first.value.col(0).array() - first.value.col(0).mean(),
+                        v = second.value.col(0).array() - second.value.col(0).mean();
+  const double norms = u.norm() * v.norm();
+  return norms > 0 ? u.dot(v) / norms : 0;
 }
 
 int different_values(const Covariate& covariate, const std::vector<int>& rows) {
@@ -158,25 +146,30 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
   for (const Covariate& covariate : observations.covariates) {
     if (observations.not_usable.contains(covariate.name) || covariate.value.array().isNaN().any()) continue;
     if (!(covariate.value.maxCoeff() > covariate.value.minCoeff())) continue;
-    if (const std::vector<double> levels = levels_of(observations, covariate, rows); !levels.empty())
+    if (const std::vector<double> levels = levels_of(observations, covariate, rows); !levels.empty()) {
+      const auto column_at = [&](int k, double x) { return level_column(levels, k, x); };
       for (const int rotor : rotors)
         curves.push_back({.covariate = covariate.name,
                           .rotor = rotor,
                           .shape = CurveShape::kLevels,
-                          .columns = level_columns(observations, covariate, rotor, levels),
+                          .columns = columns_over(observations, covariate, rotor,
+                                                  static_cast<int>(levels.size()) - 1, column_at),
                           .x = covariate.value,
                           .levels = levels,
                           .labels = covariate.labels});
+    }
     if (!covariate.labels.empty()) continue;
     if (covariate.derived && covariate.name == "hour_of_day" && repeats_another(observations, covariate))
       continue;
     const int most = different_values(covariate, rows) / 3;
+    const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff();
     const auto add = [&](CurveShape shape, int count) {
+      const auto column_at = [&](int k, double x) { return curve_column(shape, k, x, low, high); };
       for (const int rotor : rotors)
         curves.push_back({.covariate = covariate.name,
                           .rotor = rotor,
                           .shape = shape,
-                          .columns = columns_over(observations, covariate, rotor, shape, count),
+                          .columns = columns_over(observations, covariate, rotor, count, column_at),
                           .x = covariate.value});
     };
     if (most >= 1)

@@ -30,6 +30,9 @@ struct Curve {
 /// covariate can show: one for every three different values, at most six.
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows);
 
+/// Over all rows, of the first channel; 0 where one of them is constant.
+double correlation(const Covariate& first, const Covariate& second);
+
 /// How many values `rows` have; of the first channel.
 int different_values(const Covariate& covariate, const std::vector<int>& rows);
 

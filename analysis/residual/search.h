@@ -42,8 +42,8 @@ class Search {
 
   // named effects: search_effects.cpp
   void add_effects();
-  bool already_in(const Term& way) const;
-  /// All candidates on top of a model.
+  static bool already_in(const Term& way, const MeanModel& model);
+  /// All candidates on top of a model, but for what it has.
   Scan scan_effects(const JointFit& base) const;
   Candidate candidate_of(const Term& way, const Eigen::MatrixXd& predicted) const;
   void rank(const JointFit& base, Scan& scan) const;
@@ -92,9 +92,9 @@ class Search {
   bool add_best_curve(const CurveScan& curves);
   /// A name whose work a curve does as well was the wrong name for that curve.
   void drop_what_a_curve_replaces();
-  /// Whether effect t is beyond chance among all candidates with the curves in: what was found while their
+  /// Whether an effect is beyond chance among all candidates with the curves in: what was found while their
   /// structure was in the residual may have been a part of it. `without`: the fit without it.
-  bool is_still_found(std::size_t t, const JointFit& without);
+  bool is_still_found(const Term& term, const JointFit& without);
   /// Whether the newest curve, over a covariate of this effect, has more of the effect's size than its
   /// formula may leave: then the effect was only the curve's straight part.
   bool outshone_by_curve(const Term& term) const;
@@ -132,7 +132,6 @@ class Search {
   std::map<std::string, std::size_t> points_;  // change-points tried of an effect and rotor
   JointFit fit_;
   Attribution result_;
-  std::vector<std::vector<Ranked>> confounded_;
   double critical_ = 0;
   std::uint64_t salt_ = 0;
 };

@@ -133,11 +133,12 @@ void Search::doubt_formulas() {
 
 void Search::drop_what_a_curve_replaces() {
   for (std::size_t t = result_.accepted.size(); t-- > 0;) {
-    if (t >= result_.accepted.size()) continue;        // gone with another
-    if (result_.accepted[t].term.per_group) continue;  // stands in the baseline
-    const bool outshone = outshone_by_curve(result_.accepted[t].term);
+    if (t >= result_.accepted.size()) continue;  // gone with another
+    const Term term = result_.accepted[t].term;
+    if (term.per_group) continue;  // stands in the baseline
+    const bool outshone = outshone_by_curve(term);
     const JointFit without = fit_without(t);
-    if (!outshone && !at_bound(fit_, result_.accepted[t].term) && is_still_found(t, without)) continue;
+    if (!outshone && !at_bound(fit_, term) && is_still_found(term, without)) continue;
     if (outshone)
       give_way_to_curve(t, without);
     else
@@ -145,14 +146,10 @@ void Search::drop_what_a_curve_replaces() {
   }
 }
 
-bool Search::is_still_found(std::size_t t, const JointFit& without) {
-  const auto at = static_cast<std::ptrdiff_t>(t);
-  const Accepted own = result_.accepted[t];
-  result_.accepted.erase(result_.accepted.begin() + at);
+bool Search::is_still_found(const Term& term, const JointFit& without) {
   const Scan scan = scan_effects(without);
-  result_.accepted.insert(result_.accepted.begin() + at, own);
   NullMaxima maxima(*scan.scan, without.variances, settings_, 4000 + ++salt_);
-  return maxima.p(evidence_of(scan, own.term)) <= settings_.alpha;
+  return maxima.p(evidence_of(scan, term)) <= settings_.alpha;
 }
 
 void Search::drop(std::size_t t, const JointFit& without) {

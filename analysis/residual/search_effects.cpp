@@ -43,12 +43,12 @@ void Search::add_effects() {
   }
 }
 
-bool Search::already_in(const Term& way) const {
-  return std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& accepted) {
-    const bool another_axis = way.effect->name == "crosstalk" && accepted.term.effect != way.effect;
-    return !another_axis && accepted.term.effect->name == way.effect->name &&
-           (accepted.term.rotor == way.rotor || accepted.term.rotor < 0 || way.rotor < 0) &&
-           accepted.term.other == way.other && !way.effect->has_change_point();
+bool Search::already_in(const Term& way, const MeanModel& model) {
+  return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
+    const bool another_axis = way.effect->name == "crosstalk" && term.effect != way.effect;
+    return !another_axis && term.effect->name == way.effect->name &&
+           (term.rotor == way.rotor || term.rotor < 0 || way.rotor < 0) && term.other == way.other &&
+           !way.effect->has_change_point();
   });
 }
 
@@ -56,7 +56,7 @@ Search::Scan Search::scan_effects(const JointFit& base) const {
   Scan scan;
   const Eigen::MatrixXd predicted = predict_response(observations_, base.model, rows_);
   for (const Term& way : ways_) {
-    if (already_in(way) || is_work_of_a_curve(way)) continue;
+    if (already_in(way, base.model) || is_work_of_a_curve(way)) continue;
     Candidate candidate = candidate_of(way, predicted);
     if (!mixed_->sees(candidate.columns[0])) continue;
     scan.ways.push_back(way);
@@ -241,33 +241,25 @@ void Search::read_back_terms() {
 
 void Search::swap_weaker() {
   for (std::size_t t = 0; t + 1 < result_.accepted.size(); ++t) {
-    const Accepted old = result_.accepted[t];
-    if (old.term.per_group) continue;
+    const Term old = result_.accepted[t].term;
+    if (old.per_group) continue;
     const JointFit without = fit_without(t);
-    result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
     const Scan scan = scan_effects(without);
-    const double own = evidence_of(scan, old.term);
-    const std::size_t best = scan.order.empty() ? 0 : scan.order[0];
-    const bool swap = !scan.order.empty() && !scan.ways[best].same_way(old.term) &&
-                      scan.fits[best].evidence > own + kSwapDecades;
-    Accepted kept = old;
-    if (swap) {
-      const JointFit current = fit_;
-      fit_ = without;
-      JointFit tried = fit_with(scan.ways[best], scan.fits[best].amplitude(0));
-      if (tried.variances.log_likelihood > current.variances.log_likelihood && tried.at_bound.empty()) {
-        fit_ = std::move(tried);
-        kept.term = fit_.model.terms.back();
-      } else {
-        fit_ = current;
-        result_.accepted.insert(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t), old);
-        continue;
-      }
-      result_.accepted.push_back(kept);
-      read_back_terms();
-    } else {
-      result_.accepted.insert(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t), old);
+    if (scan.order.empty()) continue;
+    const std::size_t best = scan.order[0];
+    if (scan.ways[best].same_way(old) || !(scan.fits[best].evidence > evidence_of(scan, old) + kSwapDecades))
+      continue;
+    const JointFit current = fit_;
+    fit_ = without;
+    JointFit tried = fit_with(scan.ways[best], scan.fits[best].amplitude(0));
+    if (!(tried.variances.log_likelihood > current.variances.log_likelihood) || !tried.at_bound.empty()) {
+      fit_ = current;
+      continue;
     }
+    fit_ = std::move(tried);
+    const auto place = result_.accepted.begin() + static_cast<std::ptrdiff_t>(t);
+    std::rotate(place, place + 1, result_.accepted.end());  // the new term is the model's last
+    read_back_terms();
   }
 }
 

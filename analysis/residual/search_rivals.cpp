@@ -8,21 +8,15 @@ namespace tunnelrig {
 using Eigen::Index;
 
 void Search::find_confounded() {
-  const std::vector<Accepted> all = result_.accepted;
-  for (std::size_t t = 0; t < all.size(); ++t) {
-    if (all[t].term.per_group) {
-      confounded_.push_back(rivals_in_groups(all[t]));
+  for (std::size_t t = 0; t < result_.accepted.size(); ++t) {
+    Accepted& accepted = result_.accepted[t];
+    if (accepted.term.per_group) {
+      accepted.confounded = rivals_in_groups(accepted);
       continue;
     }
     const JointFit without = fit_without(t);
-    result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
-    const Scan scan = scan_effects(without);
-    result_.accepted = all;
-    result_.accepted[t].confounded = rivals(all[t], without, scan);
-    for (std::size_t k = 0; k < t; ++k) result_.accepted[k].confounded = confounded_[k];
-    confounded_.push_back(result_.accepted[t].confounded);
+    accepted.confounded = rivals(accepted, without, scan_effects(without));
   }
-  for (std::size_t t = 0; t < confounded_.size(); ++t) result_.accepted[t].confounded = confounded_[t];
 }
 
 std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& without,
@@ -83,9 +77,9 @@ std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
   const CrossValidation own = cross_validate(observations_, y, fit_.linear.columns, fit_.variances, rows_);
   for (const Term& way : ways_) {
     const std::string& name = way.effect->name;
-    const bool taken = already_in(way) || std::any_of(result.begin(), result.end(), [&](const Ranked& r) {
-                         return r.term.effect->name == name;
-                       });
+    const bool taken = already_in(way, fit_.model) ||
+                       std::any_of(result.begin(), result.end(),
+                                   [&](const Ranked& r) { return r.term.effect->name == name; });
     if (taken) continue;
     Observations other = observations_;
     other.slopes.col(place) = respond(way, observations_, predicted).derivative[0][0];

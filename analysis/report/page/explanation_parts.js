@@ -110,10 +110,12 @@ function confusionText({confounded_with: rivals, separating_run: run}) {
   return `These data cannot tell it from ${list}.${remedy}`;
 }
 
+const nameOfText = (label) => label || '(empty)';
+
 /** What each text makes, against the mean of all. */
 const labelsText = ({shape, labels = []}, unit) => labels.length === 0 ?
     '' :
-    ` ${shape.map(([x, y]) => `${labels[x - 1] || '(empty)'} ${digits(y)}`).join(', ')}${unitSuffix(unit)}.`;
+    ` ${shape.map(([x, y]) => `${nameOfText(labels[x - 1])} ${digits(y)}`).join(', ')}${unitSuffix(unit)}.`;
 
 const unknownText = (unknown, unit) => {
   const {covariate, rotor, amplitude, p_value: p, instead_of: insteadOf = []} = unknown;

@@ -73,7 +73,7 @@ const runText = (i, channel) => {
 /** Clouds of residuals with the means of like x, and what the effect makes of them. */
 function drawPanel(panel, which, reach) {
   const bins = binsOf(panel.x), means = binned(panel.x, panel[which], bins);
-  const texts = panel.labels.map((label) => plain(label || '(empty)'));
+  const texts = panel.labels.map((label) => plain(nameOfText(label)));
   const [blue, orange] = rotorColours();
   const data = [
     {
