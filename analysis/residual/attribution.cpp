@@ -20,7 +20,10 @@ Attribution Search::run() {
   begin();
   add_effects();
   CurveScan curves = scan_curves();
-  if (begin_with_run_correlation(curves)) {
+  // Once more where rotors differ: what was found while they were taken to be alike may have been scatter.
+  for (int again = 0;
+       again < 2 && (again == 0 || observations_.rotor_scatter.size() > 0) && begin_with_scatter_of(curves);
+       ++again) {
     add_effects();
     curves = scan_curves();
   }
@@ -33,9 +36,10 @@ Attribution Search::run() {
 }
 
 void Search::begin() {
-  const auto correlation = observations_.run_correlation;
-  observations_ = given_;
-  observations_.run_correlation = correlation;
+  Observations as_given = given_;
+  as_given.run_correlation = observations_.run_correlation;
+  as_given.rotor_scatter = observations_.rotor_scatter;
+  observations_ = std::move(as_given);
   make_models();
   ways_ = all_ways(effects_, observations_, rows_);
   points_.clear();
@@ -64,8 +68,8 @@ std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Obse
 
 double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha) {
   const double variance = std::pow(variances.sigma[0], 2) * (1 + kRatios[variances.ratio[0]]);
-  const double values =
-      static_cast<double>(std::max<Eigen::Index>(mixed.dof(0), 1) * mixed.mode_matrix().cols());
+  const double values = static_cast<double>(std::max<Eigen::Index>(mixed.dof(0), 1)) *
+                        std::pow(mixed.mode_matrix().col(0).sum(), 2);
   return deviates(-std::log10(alpha)) * std::sqrt(variance / values);
 }
 

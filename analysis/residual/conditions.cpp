@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace tunnelrig {
 
@@ -156,7 +157,11 @@ void warn_of_changes_at_steps(const Observations& observations, Explanation& exp
       }
 }
 
-void warn_of_run_correlation(const Observations& observations, Explanation& explanation) {
+void warn_of_scatter(const Observations& observations, Explanation& explanation) {
+  if (observations.rotor_scatter.size() > 0)
+    explanation.warnings.push_back(
+        fmt::format("rotors scatter unlike each other (over their geometric mean: {:.2f}): allowed for",
+                    fmt::join(observations.rotor_scatter, ", ")));
   constexpr std::array<std::string_view, 2> kOf = {"all rotors together", "one rotor against another"};
   for (std::size_t s = 0; s < kOf.size(); ++s) {
     const double correlation = observations.run_correlation[s];

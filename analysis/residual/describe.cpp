@@ -49,6 +49,14 @@ std::vector<Drawn> drawn_curve(const Curve& curve, double low, double high) {
   return points;
 }
 
+/// The column of the runs sheet that a condition is made of: its own name where it is made of raw data or of
+/// the order.
+std::string column_behind(const std::string& derived) {
+  if (derived == "hours_in_session" || derived == "hour_of_day") return "start_utc";
+  if (derived == "air_temperature_rate_K_s") return "air_temperature_C";
+  return derived;
+}
+
 }  // namespace
 
 UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
@@ -64,9 +72,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
                           .instead_of = found.instead_of};
   if (const Covariate* covariate = observations.find(result.condition)) {
     result.covariate_unit = covariate->unit;
-    // The column that both kinds of hours are made of.
-    if (covariate->derived && (covariate->name == "hours_in_session" || covariate->name == "hour_of_day"))
-      result.covariate = "start_utc";
+    if (covariate->derived) result.covariate = column_behind(covariate->name);
   }
   const Components y = difference(response_components(observations), fit.linear.offset);
   const AmplitudeFit amplitudes = fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);

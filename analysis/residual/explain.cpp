@@ -14,7 +14,7 @@ using Eigen::MatrixXd;
 
 constexpr int kFewestBlocks = 6;
 constexpr std::size_t kRowsPerGross = 10;  // at most one row of ten is set aside
-constexpr std::size_t kRunsPerGross = 50;  // what touches more runs of a campaign is no slip of the hand
+constexpr std::size_t kRunsPerGross = 25;  // what touches more runs of a campaign is no slip of the hand
 constexpr int kMostSearches = 2;           // after the first, each without the gross rows of the one before
 
 /// Errors of the fitted runs themselves, n × c in the unit.
@@ -206,8 +206,9 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   // What the baseline is held against: the same, without what groups have of their own.
   Observations alone = observations;
   alone.run_correlation = wide.run_correlation;
+  alone.rotor_scatter = wide.rotor_scatter;
   report_untestable(alone, effects, rows, explanation);
-  warn_of_run_correlation(wide, explanation);
+  warn_of_scatter(wide, explanation);
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
   explanation.detectable = found.detectable_sigma * scale_of(observations);
@@ -362,6 +363,8 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
     if (aside.room() == 0) break;
     aside.take({*row});
   }
+  if (!observations.from_table)
+    if (const auto wild = wild_runs(aside.kept); wild.size() <= aside.room()) aside.take(wild);
   Explanation explanation = explain_all(aside.kept, effects, settings);
   for (int again = 0; again < kMostSearches; ++again) {
     const std::vector<SuspectRow> gross = gross_rows(aside.kept, explanation.suspect_rows);

@@ -134,7 +134,7 @@ class Page {
       by_mode.middleCols(stratum.first_mode, stratum.modes) =
           Eigen::Map<const MatrixXd>(stacked.data(), added.rows(), stratum.modes);
     }
-    return by_mode * mixed.mode_matrix().transpose();
+    return by_mode * mixed.rotors_of_modes();
   }
 
   /// Points of one covariate: the residual with everything else in, and what this term makes of it.

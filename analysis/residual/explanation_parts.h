@@ -16,7 +16,7 @@ void report_untestable(const Observations& observations, const std::vector<const
 void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation);
 
 /// Neighbouring runs that resemble each other, as the search found and allowed for.
-void warn_of_run_correlation(const Observations& observations, Explanation& explanation);
+void warn_of_scatter(const Observations& observations, Explanation& explanation);
 
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
@@ -58,6 +58,10 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
 /// The worst row of a table whose rows stand for themselves, if it is beyond doubt with all that the other
 /// axes can explain in the model.
 std::optional<SuspectRow> gross_row(const Observations& observations);
+
+/// Runs of a campaign that no scatter, however heavy its tails, is likely to have made: by medians, which
+/// several such runs do not move as they move a fit and its variance.
+std::vector<SuspectRow> wild_runs(const Observations& observations);
 
 /// Those that no scatter, however heavy its tails, is likely to have made.
 std::vector<SuspectRow> gross_rows(const Observations& observations, const std::vector<SuspectRow>& suspects);

@@ -148,8 +148,8 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     variance_by_mode.middleCols(stratum.first_mode, stratum.modes) = variances;
   }
   result.whitened = concatenated(parts);
-  const MatrixXd error_y = error_by_mode * model.mode_matrix().transpose();
-  const MatrixXd std_y = (variance_by_mode * model.mode_matrix().transpose().cwiseAbs2()).cwiseSqrt();
+  const MatrixXd error_y = error_by_mode * model.rotors_of_modes();
+  const MatrixXd std_y = (variance_by_mode * model.rotors_of_modes().cwiseAbs2()).cwiseSqrt();
   for (Index r = 0; r < n; ++r)
     for (Index channel = 0; channel < c; ++channel) {
       const double value = observations.value(test_rows[static_cast<std::size_t>(r)], channel);

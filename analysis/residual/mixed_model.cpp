@@ -9,6 +9,17 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Rotors that have something in common and each as much of its own: D^(−½) makes what they have of their own
+/// alike, and what they have in common a direction, which is the first mode.
+MatrixXd modes_of(const VectorXd& rotor_scatter) {
+  const VectorXd one = rotor_scatter.cwiseInverse();
+  MatrixXd columns = MatrixXd::Identity(one.size(), one.size());
+  columns.col(0) = one;
+  const MatrixXd orthonormal = Eigen::HouseholderQR<MatrixXd>(columns).householderQ();
+  return one.asDiagonal() * orthonormal;
+}
 
 /// Mean of the rotors, then contrasts. Four rotors: sides, ends, and turning directions against each other.
 MatrixXd orthonormal_modes(Index channels) {
@@ -100,9 +111,11 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
                        const std::vector<std::size_t>& ratio, const std::array<double, 2>& run_correlation)
     : observations_(observations),
       rows_(std::move(rows)),
-      modes_(orthonormal_modes(observations.channels())),
+      modes_(observations.rotor_scatter.size() > 0 ? modes_of(observations.rotor_scatter)
+                                                   : orthonormal_modes(observations.channels())),
       run_correlation_(run_correlation) {
   if (modes_(0, 0) < 0) modes_ *= -1;
+  rotors_of_modes_ = observations.rotor_scatter.size() > 0 ? MatrixXd(modes_.inverse()) : modes_.transpose();
   for (std::size_t component = 0; component <= observations.shape.size(); ++component) {
     strata_.push_back({component, 0, 1});
     if (observations.channels() > 1)

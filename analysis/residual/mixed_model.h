@@ -2,10 +2,11 @@
 //
 //   y = (group's constant, free per rotor) + terms + session + run
 //
-// The rotors' y are rotated into one common and c − 1 difference modes; the runs' means and each cosine
-// coefficient of their course, common or difference, make a stratum with a run variance σ² and a session
-// variance a σ² of its own. A run's mean may be correlated with that of the run before it by φ:
-// V = σ² (Φ + a 11ᵀ) in each session, Φ_ij = φ^|i − j|. docs/closed-loop.md has the equations.
+// The rotors' y are rotated into one common and c − 1 difference modes (each rotor's first divided by its
+// scatter, where they differ in it); the runs' means and each cosine coefficient of their course, common or
+// difference, make a stratum with a run variance σ² and a session variance a σ² of its own. A run's mean may
+// be correlated with that of the run before it by φ: V = σ² (Φ + a 11ᵀ) in each session, Φ_ij = φ^|i − j|.
+// docs/closed-loop.md has the equations.
 #pragma once
 
 #include "analysis/residual/terms.h"
@@ -86,8 +87,11 @@ class MixedModel {
                    const std::vector<std::size_t>& ratio, double run_correlation,
                    std::mt19937_64& random) const;
 
-  /// Orthonormal, c × c; the first column is the mean's.
+  /// By which rows of rotors are multiplied, c × c: orthonormal where rotors scatter alike. What is the same
+  /// in all rotors is in the first mode alone.
   const Eigen::MatrixXd& mode_matrix() const { return modes_; }
+  /// Its inverse: by which rows of modes are multiplied.
+  const Eigen::MatrixXd& rotors_of_modes() const { return rotors_of_modes_; }
 
  private:
   /// A constant and the slopes of one group's runs, as orthonormal columns: [1 slopes] · to_orthonormal,
@@ -132,7 +136,7 @@ class MixedModel {
   /// L is sparse: of each run, the first of its columns and what stands in them.
   std::vector<Eigen::Index> first_column_;
   Eigen::MatrixXd own_;
-  Eigen::MatrixXd modes_;
+  Eigen::MatrixXd modes_, rotors_of_modes_;
   std::vector<Stratum> strata_;
   std::size_t ratios_ = kRatios.size();
   std::array<double, 2> run_correlation_ = {0, 0};

@@ -63,6 +63,8 @@ struct Observations {
   /// Of the scatter of neighbouring runs of a block: what rotors have in common, what they differ by. Not
   /// known before the search has found it (run_correlation.h).
   std::array<double, 2> run_correlation = {0, 0};
+  /// Of each rotor's own scatter over their geometric mean; empty: alike. Found likewise (rotor_scatter.h).
+  Eigen::VectorXd rotor_scatter;
 
   Eigen::VectorXd newtons_per_volt;  // c
   /// n: −1 where `value` is the magnitude of a response below zero, which effects are added to with its sign.

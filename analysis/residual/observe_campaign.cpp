@@ -171,7 +171,7 @@ void add_derived_covariates(const Source& source, Observations& result) {
   result.covariates.push_back(order);
   const Covariate* air = result.find("air_temperature_C");
   if (air == nullptr) return;
-  Covariate trend{"air_temperature_rate_K_s", MatrixXd::Zero(n, 1), true};
+  Covariate trend{"air_temperature_rate_K_s", MatrixXd::Zero(n, 1), true, "K/s"};
   for (Index row = 0; row < n; ++row) {
     Index low = row, high = row;
     if (row > 0 &&

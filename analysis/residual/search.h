@@ -82,9 +82,12 @@ class Search {
   double rms_of(const Eigen::MatrixXd& column) const;
 
   // structure without a name: search_curves.cpp
-  /// Whether neighbouring runs resemble each other beside the model and the best curve, whose own dependence
-  /// on what drifts must not count as theirs. Then the search has begun again, with runs so correlated.
-  bool begin_with_run_correlation(const CurveScan& curves);
+  /// Whether one rotor scatters more than another, or neighbouring runs resemble each other, beside the model
+  /// and the best curve, whose own part must not count as scatter. Then the search has begun again, with such
+  /// scatter.
+  bool begin_with_scatter_of(const CurveScan& curves);
+  /// What is left beside the model and the best curve, if that has this evidence.
+  Components rest_beside(const CurveScan& curves, double least_evidence) const;
   /// All curves on top of the model.
   CurveScan scan_curves() const;
   /// `first`: the curves on top of the model as it is.

@@ -1,5 +1,6 @@
 // Structure without a name.
 #include "analysis/residual/null_maxima.h"
+#include "analysis/residual/rotor_scatter.h"
 #include "analysis/residual/run_correlation.h"
 #include "analysis/residual/search.h"
 
@@ -18,6 +19,12 @@ namespace {
 constexpr double kMostLeft = 0.3, kMostLeft_bending = 1;
 constexpr double kDoubtedP = 0.01;  // of a bend beside an effect, tested alone
 
+bool are_alike(const Eigen::VectorXd& scatter, const Eigen::VectorXd& other) {
+  constexpr double kAlike = 0.05;
+  return scatter.size() == other.size() &&
+         (scatter.size() == 0 || (scatter.cwiseQuotient(other).array().log().abs() < kAlike).all());
+}
+
 }  // namespace
 
 void Search::add_curves(const CurveScan& first) {
@@ -35,7 +42,7 @@ Search::CurveScan Search::scan_curves() const {
   for (const Curve& each : curves_) {
     if (is_described(each)) continue;
     const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
-      return is_over(each, a.term.effect->covariates);
+      return a.term.rotor == each.rotor && is_over(each, a.term.effect->covariates);
     });
     // What is straight over few values has a name then, and the bends ask for the rest.
     if (named && each.shape == CurveShape::kLevels) continue;
@@ -49,9 +56,9 @@ Search::CurveScan Search::scan_curves() const {
   return result;
 }
 
-bool Search::begin_with_run_correlation(const CurveScan& curves) {
+Components Search::rest_beside(const CurveScan& curves, double least_evidence) const {
   std::vector<Components> columns = fit_.linear.columns;
-  if (!curves.tried.empty()) {
+  if (!curves.tried.empty() && curves.scan.fits[curves.scan.order[0]].evidence >= least_evidence) {
     const auto& best = curves.tried[curves.scan.order[0]].columns;
     columns.insert(columns.end(), best.begin(), best.end());
   }
@@ -60,9 +67,28 @@ bool Search::begin_with_run_correlation(const CurveScan& curves) {
   for (std::size_t c = 0; c < columns.size(); ++c)
     for (std::size_t j = 0; j < residual.size(); ++j)
       residual[j] -= fit.amplitude(static_cast<Eigen::Index>(c)) * columns[c][j];
-  std::mt19937_64 random(settings_.seed * 1000003 + 3000);
-  observations_.run_correlation = run_correlation(*mixed_, fit_.variances, residual, random);
-  if (observations_.run_correlation == std::array<double, 2>{0, 0}) return false;
+  return residual;
+}
+
+bool Search::begin_with_scatter_of(const CurveScan& curves) {
+  const bool known = observations_.rotor_scatter.size() > 0;
+  // While a rotor that scatters more was taken for one like the others, the best curve had a part of its
+  // scatter.
+  const Components residual = rest_beside(curves, known ? critical_ : 0);
+  std::mt19937_64 random(settings_.seed * 1000003 + 3000), other(settings_.seed * 1000003 + 4000);
+  Observations scattered = observations_;
+  scattered.rotor_scatter = rotor_scatter(observations_, rows_, residual, other);
+  scattered.run_correlation = {0, 0};
+  const MixedModel model(scattered, rows_);
+  const NullFit variances = known || scattered.rotor_scatter.size() > 0
+                                ? CandidateScan(model, {}, {}).null_fit(residual)
+                                : fit_.variances;
+  const auto correlation = run_correlation(model, variances, residual, random);
+  if (are_alike(scattered.rotor_scatter, observations_.rotor_scatter) &&
+      (known || correlation == observations_.run_correlation))
+    return false;
+  observations_.rotor_scatter = scattered.rotor_scatter;
+  observations_.run_correlation = correlation;
   begin();
   return true;
 }

@@ -1,5 +1,6 @@
 // The next run: where two explanations that agree so far would disagree most.
 #include "analysis/residual/explanation.h"
+#include "analysis/residual/upper_median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,10 +27,7 @@ struct Setting {
   bool in_tunnel = true;
 };
 
-double median(VectorXd values) {
-  std::nth_element(values.data(), values.data() + values.size() / 2, values.data() + values.size());
-  return values(values.size() / 2);
-}
+double median(const VectorXd& values) { return upper_median({values.begin(), values.end()}); }
 
 /// What a laboratory can set, a little beyond what was seen; never below zero where zero is a limit.
 std::pair<double, double> reach(const Covariate& covariate) {

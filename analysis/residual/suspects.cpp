@@ -1,5 +1,6 @@
 // Rows that do not belong to the others.
 #include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/upper_median.h"
 #include "calibration/distributions.h"
 
 #include <algorithm>
@@ -21,14 +22,32 @@ double degrees_of_freedom(const Observations& observations, const JointFit& fit,
   return static_cast<double>(std::max<Index>(dof, 2));
 }
 
+namespace {
+
+/// Of each rotor, in y: its own, and what it has in common with the others.
+VectorXd variance_of_a_run(const Observations& observations, const NullFit& variances,
+                           const std::vector<int>& rows) {
+  const MixedModel mixed = MixedModel::baseline_alone(observations, rows);
+  VectorXd result = VectorXd::Zero(observations.channels());
+  for (std::size_t s = 0; s < mixed.strata().size(); ++s) {
+    const MixedModel::Stratum& stratum = mixed.strata()[s];
+    if (!stratum.means()) continue;
+    const double variance = std::pow(variances.sigma[s], 2) * (1 + kRatios[variances.ratio[s]]);
+    result += variance * mixed.rotors_of_modes()
+                             .middleRows(stratum.first_mode, stratum.modes)
+                             .colwise()
+                             .squaredNorm()
+                             .transpose();
+  }
+  return result;
+}
+
+}  // namespace
+
 std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
                                      const NullFit& variances, double dof) {
   constexpr double kLeastLeft = 0.02;
-  double sigma2 = 0;
-  const double channels = static_cast<double>(observations.channels());
-  for (std::size_t s = 0; s < (channels > 1 ? 2U : 1U); ++s)
-    sigma2 += std::pow(variances.sigma[s], 2) * (1 + kRatios[variances.ratio[s]]) *
-              (s == 0 ? 1 : channels - 1) / channels;
+  const VectorXd sigma2 = variance_of_a_run(observations, variances, errors.rows);
   // On the scale of the model, where residuals are normal: of a tenth and of ten times alike.
   MatrixXd residual = -errors.error, left = MatrixXd::Ones(residual.rows(), residual.cols());  // 1 − h
   for (Index r = 0; r < residual.rows(); ++r)
@@ -39,7 +58,8 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
         unit = std::abs(value + errors.error(r, c));  // what was predicted
         residual(r, c) = std::log(std::abs(value) / unit);
       }
-      left(r, c) = std::max(2 - std::pow(errors.expected_std(r, c) / unit, 2) / sigma2, kLeastLeft);
+      residual(r, c) /= std::sqrt(sigma2(c));
+      left(r, c) = std::max(2 - std::pow(errors.expected_std(r, c) / unit, 2) / sigma2(c), kLeastLeft);
     }
   const auto missing = residual.array().isNaN();
   const double variance = missing.select(0, residual).squaredNorm() / missing.select(0, left).sum();
@@ -80,6 +100,38 @@ std::optional<SuspectRow> gross_row(const Observations& observations) {
   const std::vector<SuspectRow> suspects = suspect_rows(observations, errors, fit.variances, dof);
   if (suspects.empty() || std::abs(suspects[0].studentised) < kGross) return {};
   return suspects[0];
+}
+
+std::vector<SuspectRow> wild_runs(const Observations& observations) {
+  // A normal run's median deviation is 0.67 σ. Of Student's t with three degrees of freedom one of 18,000
+  // lies beyond this.
+  constexpr double kWild = 30;
+  constexpr std::size_t kFewestRuns = 3;  // of two, the median does not tell which
+  std::map<int, std::vector<Index>> runs_of_group;
+  for (Index r = 0; r < observations.rows(); ++r)
+    runs_of_group[observations.group[static_cast<std::size_t>(r)]].push_back(r);
+  VectorXd worst = VectorXd::Zero(observations.rows());
+  for (Index c = 0; c < observations.channels(); ++c) {
+    VectorXd residual = VectorXd::Zero(observations.rows());
+    std::vector<double> sizes;
+    for (const auto& [group, runs] : runs_of_group) {
+      if (runs.size() < kFewestRuns) continue;
+      const VectorXd y = observations.y(runs, c);
+      const double middle = upper_median({y.begin(), y.end()});
+      for (const Index run : runs) {
+        residual(run) = observations.y(run, c) - middle;
+        sizes.push_back(std::abs(residual(run)));
+      }
+    }
+    const double sigma = sizes.empty() ? 0 : upper_median(sizes) / 0.6745;
+    for (Index r = 0; r < observations.rows() && sigma > 0; ++r)
+      if (std::abs(residual(r) / sigma) > std::abs(worst(r))) worst(r) = residual(r) / sigma;
+  }
+  std::vector<SuspectRow> result;
+  for (Index r = 0; r < observations.rows(); ++r)
+    if (std::abs(worst(r)) > kWild)
+      result.push_back({observations.name[static_cast<std::size_t>(r)], worst(r)});
+  return result;
 }
 
 std::vector<SuspectRow> gross_rows(const Observations& observations,

@@ -1,5 +1,7 @@
 #include "analysis/residual/terms.h"
 
+#include "analysis/residual/upper_median.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -18,13 +20,6 @@ using Eigen::VectorXd;
 /// Times within a run at which an effect that changes with time is evaluated.
 constexpr int kTimes = 32;
 constexpr int kLeastBlocksBesideAStep = 3;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// cos(π j (t + ½)/kTimes), j = 0 … kShapes, scaled to give mean and cosine coefficients.
 const MatrixXd& cosines() {
@@ -201,7 +196,7 @@ std::vector<double> reference_of(const Effect& effect, const Observations& obser
     std::vector<double> values;
     for (Index row = 0; covariate != nullptr && row < covariate->value.rows(); ++row)
       if (!std::isnan(covariate->value(row, 0))) values.push_back(covariate->value(row, 0));
-    result.push_back(median(std::move(values)));
+    result.push_back(upper_median(std::move(values)));
   }
   return result;
 }

@@ -304,22 +304,6 @@ TEST_F(ExplainTest, RivalsStayWithinTheirBounds) {
   EXPECT_THAT(e.adopted[0].confounded_with, testing::Not(Contains("excitation_voltage")));
 }
 
-TEST_F(ExplainTest, AGrossRunIsSuspectAndNamesNothing) {
-  for (const double wrong : {0.02, 0.5}) {  // 10 σ and 250 σ
-    Observations o = observations(16);
-    Eigen::MatrixXd y = o.y;
-    y(77, 2) += wrong;
-    test::set_y(o, y);
-    const Explanation e = explained(o);
-    ASSERT_EQ(e.suspect_rows.size(), 1u) << wrong;
-    EXPECT_EQ(e.suspect_rows[0].row, o.name[77]);
-    EXPECT_GT(e.suspect_rows[0].studentised, 5) << "measured above predicted";
-    EXPECT_EQ(e.suspect_rows[0].set_aside, wrong > 0.1);
-    EXPECT_EQ(e.runs, wrong > 0.1 ? 127 : 128);
-    EXPECT_EQ(e.verdict, "no_structure") << wrong;
-  }
-}
-
 TEST_F(ExplainTest, WhatVariesBetweenSessionsIsSeenFromMore) {
   Observations o = test::simulate(
       {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .sigma = 0.002, .session_ratio = 2}, random);

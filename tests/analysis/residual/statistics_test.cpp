@@ -136,6 +136,26 @@ TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
   EXPECT_GE(seen, kCampaigns - 3);
 }
 
+/// In a model of rotors that are alike, half of such campaigns have structure.
+TEST_F(Statistics, ARotorThatScattersMoreIsNoStructure) {
+  SearchSettings settings;
+  settings.simulations = 199;
+  constexpr int kCampaigns = 40;
+  int said = 0;
+  for (int i = 0; i < kCampaigns; ++i) {
+    Observations o = campaign(0.4, 4, 0);
+    std::normal_distribution<double> more(0, 0.008);  // four times the others'
+    MatrixXd y = o.y;
+    for (double& value : y.col(i % 4)) value += more(random);
+    test::set_y(o, y);
+    settings.seed = static_cast<std::uint64_t>(i + 1);
+    const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
+    said += found.accepted.empty() && found.curves.empty() ? 0 : 1;
+  }
+  std::cout << said << " of " << kCampaigns << " with structure\n";
+  EXPECT_LE(said, 7) << "binomial (40, 0.06): beyond 7 in 0.2 % of cases";
+}
+
 TEST_F(Statistics, FittedParametersScatterAsTheirErrorsSay) {
   double squares = 0;
   int inside = 0;

@@ -1,0 +1,140 @@
+// Scatter that is not the same everywhere: a rotor's own, and runs that belong to no scatter.
+#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/rotor_scatter.h"
+#include "analysis/residual/simulated.h"
+#include "support/seeds.h"
+
+#include <gmock/gmock.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kRunSigma = 0.002;
+
+struct Scatter : testing::Test {
+  std::mt19937_64 random{test::seed()};
+
+  Observations observations() {
+    Observations o = test::simulate(
+        {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .sigma = kRunSigma, .session_ratio = 0.4},
+        random);
+    test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
+    test::add_covariate(o, "tunnel_airspeed_m_s", 0, 0.4, random);
+    return o;
+  }
+
+  /// `times` the others' scatter from run to run.
+  void let_scatter_more(Observations& o, Index rotor, double times) {
+    std::normal_distribution<double> normal(0, kRunSigma * std::sqrt(times * times - 1));
+    MatrixXd y = o.y;
+    for (Index row = 0; row < y.rows(); ++row) y(row, rotor) += normal(random);
+    test::set_y(o, y);
+  }
+
+  VectorXd found(const Observations& o) { return rotor_scatter(o, o.all_rows(), {o.y}, random); }
+
+  static Explanation explained(const Observations& o) {
+    SearchSettings settings;
+    settings.simulations = 199;
+    return explain(o, test::every_effect(), settings);
+  }
+};
+
+/// Own scatters and a part that is the same in all: the modes are uncorrelated, the differences alike.
+TEST_F(Scatter, ModesMakeRotorsAlike) {
+  Observations o = observations();
+  o.rotor_scatter.resize(4);
+  o.rotor_scatter << 0.5, 1, 3, 0.8;
+  const MixedModel model(o, o.all_rows());
+  const MatrixXd& modes = model.mode_matrix();
+  MatrixXd covariance = MatrixXd::Constant(4, 4, 2.0);
+  covariance.diagonal() += o.rotor_scatter.cwiseAbs2();
+  const MatrixXd of_modes = modes.transpose() * covariance * modes;
+  EXPECT_LT((of_modes - MatrixXd(of_modes.diagonal().asDiagonal())).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((of_modes.diagonal().tail(3).array() - 1).abs().maxCoeff(), 1e-12);
+  const Eigen::RowVectorXd alike = Eigen::RowVectorXd::Ones(4) * modes;
+  EXPECT_GT(alike(0), 0);
+  EXPECT_LT(alike.tail(3).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((modes * model.rotors_of_modes() - MatrixXd::Identity(4, 4)).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST_F(Scatter, OfOneRotorIsFoundAndOfAlikeRotorsNot) {
+  constexpr int kCampaigns = 40;
+  int alike_differ = 0, differ = 0;
+  double ratio = 0;
+  for (int i = 0; i < kCampaigns; ++i) {
+    Observations o = observations();
+    alike_differ += found(o).size() > 0 ? 1 : 0;
+    let_scatter_more(o, 2, 4);
+    const VectorXd scatter = found(o);
+    if (scatter.size() == 0) continue;
+    ++differ;
+    EXPECT_NEAR(scatter.prod(), 1, 1e-9);
+    ratio += scatter(2) / std::cbrt(scatter(0) * scatter(1) * scatter(3)) / kCampaigns;
+  }
+  EXPECT_LE(alike_differ, 3) << "0.5 % of 40 are expected";
+  EXPECT_EQ(differ, kCampaigns);
+  EXPECT_NEAR(ratio, 4, 0.6);
+}
+
+TEST_F(Scatter, OfOneRotorIsSaidAndIsNoStructure) {
+  Observations o = observations();
+  let_scatter_more(o, 2, 4);
+  const Explanation e = explained(o);
+  EXPECT_EQ(e.verdict, "no_structure");
+  EXPECT_THAT(e.warnings, testing::Contains(testing::HasSubstr("rotors scatter unlike each other")));
+  EXPECT_TRUE(e.suspect_rows.empty()) << "its runs are judged by its own scatter";
+}
+
+TEST_F(Scatter, OfOneRotorDoesNotHideAnEffectOnIt) {
+  Observations o = observations();
+  let_scatter_more(o, 2, 4);
+  const VectorXd voltage = o.find("supply_voltage_V")->value.col(0);
+  MatrixXd y = o.y;
+  y.col(2).array() += 3 * 4 * kRunSigma * (voltage.array() - 16);  // about 0.9 of its own scatter
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  std::vector<int> rotors;
+  for (const AdoptedEffect& adopted : e.adopted) rotors.push_back(adopted.term.rotor);
+  for (const UnknownStructure& unknown : e.unknown) rotors.push_back(unknown.rotor);
+  EXPECT_EQ(rotors, std::vector<int>{2});
+}
+
+TEST_F(Scatter, AGrossRunIsSuspectAndNamesNothing) {
+  for (const double wrong : {0.02, 0.5}) {  // 10 σ and 250 σ
+    Observations o = observations();
+    MatrixXd y = o.y;
+    y(77, 2) += wrong;
+    test::set_y(o, y);
+    const Explanation e = explained(o);
+    ASSERT_EQ(e.suspect_rows.size(), 1u) << wrong;
+    EXPECT_EQ(e.suspect_rows[0].row, o.name[77]);
+    EXPECT_GT(e.suspect_rows[0].studentised, 5) << "measured above predicted";
+    EXPECT_EQ(e.suspect_rows[0].set_aside, wrong > 0.1);
+    EXPECT_EQ(e.runs, wrong > 0.1 ? 127 : 128);
+    EXPECT_EQ(e.verdict, "no_structure") << wrong;
+  }
+}
+
+/// Each makes the variance that the others are held against.
+TEST_F(Scatter, SeveralGrossRunsDoNotHideEachOther) {
+  Observations o = observations();
+  MatrixXd y = o.y;
+  const std::vector<Index> wrong = {11, 50, 77, 78, 120};
+  for (const Index row : wrong) y(row, row % 4) -= 0.7;  // half the thrust
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.suspect_rows.size(), wrong.size());
+  for (std::size_t k = 0; k < wrong.size(); ++k) {
+    EXPECT_EQ(e.suspect_rows[k].row, o.name[static_cast<std::size_t>(wrong[k])]);
+    EXPECT_TRUE(e.suspect_rows[k].set_aside);
+  }
+  EXPECT_EQ(e.verdict, "no_structure");
+}
+
+}  // namespace
+}  // namespace tunnelrig
