@@ -15,7 +15,8 @@ void report_untestable(const Observations& observations, const std::vector<const
 /// Conditions that change once and for all where an adopted step may be: another battery, other blades.
 void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation);
 
-/// Neighbouring runs that resemble each other, as the search found and allowed for.
+/// What the search found of the runs' scatter and allowed for: a rotor with more of it, neighbours that
+/// resemble each other.
 void warn_of_scatter(const Observations& observations, Explanation& explanation);
 
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.

@@ -79,11 +79,16 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
   Observations scattered = observations_;
   scattered.rotor_scatter = rotor_scatter(observations_, rows_, residual, other);
   scattered.run_correlation = {0, 0};
-  const MixedModel model(scattered, rows_);
-  const NullFit variances = known || scattered.rotor_scatter.size() > 0
-                                ? CandidateScan(model, {}, {}).null_fit(residual)
-                                : fit_.variances;
-  const auto correlation = run_correlation(model, variances, residual, random);
+  const auto correlation_in = [&](const MixedModel& model, const NullFit& variances) {
+    return run_correlation(model, variances, residual, random);
+  };
+  std::array<double, 2> correlation;
+  if (known || scattered.rotor_scatter.size() > 0) {
+    const MixedModel model(scattered, rows_);
+    correlation = correlation_in(model, CandidateScan(model, {}, {}).null_fit(residual));
+  } else {
+    correlation = correlation_in(*mixed_, fit_.variances);
+  }
   if (are_alike(scattered.rotor_scatter, observations_.rotor_scatter) &&
       (known || correlation == observations_.run_correlation))
     return false;
