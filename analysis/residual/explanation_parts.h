@@ -60,8 +60,9 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
 /// axes can explain in the model.
 std::optional<SuspectRow> gross_row(const Observations& observations);
 
-/// Runs of a campaign that no scatter, however heavy its tails, is likely to have made: by medians, which
-/// several such runs do not move as they move a fit and its variance.
+/// Runs of a campaign in which one rotor is further from the others than any scatter makes it, however heavy
+/// its tails: by medians, which several such runs do not move as they move a fit and its variance. What all
+/// rotors of a run do may be its conditions' work, another speed's for example.
 std::vector<SuspectRow> wild_runs(const Observations& observations);
 
 /// Those that no scatter, however heavy its tails, is likely to have made.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace tunnelrig {
@@ -105,32 +106,35 @@ std::optional<SuspectRow> gross_row(const Observations& observations) {
 std::vector<SuspectRow> wild_runs(const Observations& observations) {
   // A normal run's median deviation is 0.67 σ. Of Student's t with three degrees of freedom one of 18,000
   // lies beyond this.
-  constexpr double kWild = 30;
-  constexpr std::size_t kFewestRuns = 3;  // of two, the median does not tell which
+  constexpr double kWild = 30, kMedianOfNormal = 0.6745;
+  constexpr std::size_t kFewest = 3;  // of two runs or rotors, nothing says which is wrong
+  if (static_cast<std::size_t>(observations.channels()) < kFewest) return {};
   std::map<int, std::vector<Index>> runs_of_group;
   for (Index r = 0; r < observations.rows(); ++r)
     runs_of_group[observations.group[static_cast<std::size_t>(r)]].push_back(r);
-  VectorXd worst = VectorXd::Zero(observations.rows());
-  for (Index c = 0; c < observations.channels(); ++c) {
-    VectorXd residual = VectorXd::Zero(observations.rows());
-    std::vector<double> sizes;
-    for (const auto& [group, runs] : runs_of_group) {
-      if (runs.size() < kFewestRuns) continue;
+  MatrixXd away = observations.y;
+  for (const auto& [group, runs] : runs_of_group)
+    for (Index c = 0; c < away.cols(); ++c) {
       const VectorXd y = observations.y(runs, c);
-      const double middle = upper_median({y.begin(), y.end()});
-      for (const Index run : runs) {
-        residual(run) = observations.y(run, c) - middle;
-        sizes.push_back(std::abs(residual(run)));
-      }
+      away(runs, c).array() -= upper_median({y.begin(), y.end()});
+      if (runs.size() < kFewest) away(runs, c).setZero();
     }
-    const double sigma = sizes.empty() ? 0 : upper_median(sizes) / 0.6745;
-    for (Index r = 0; r < observations.rows() && sigma > 0; ++r)
-      if (std::abs(residual(r) / sigma) > std::abs(worst(r))) worst(r) = residual(r) / sigma;
+  for (Index r = 0; r < away.rows(); ++r) {
+    const VectorXd rotors = away.row(r);
+    away.row(r).array() -= upper_median({rotors.begin(), rotors.end()});
+  }
+  for (Index c = 0; c < away.cols(); ++c) {
+    const VectorXd size = away.col(c).cwiseAbs();
+    const double sigma = upper_median({size.begin(), size.end()}) / kMedianOfNormal;
+    away.col(c) /= sigma > 0 ? sigma : std::numeric_limits<double>::infinity();
   }
   std::vector<SuspectRow> result;
-  for (Index r = 0; r < observations.rows(); ++r)
-    if (std::abs(worst(r)) > kWild)
-      result.push_back({observations.name[static_cast<std::size_t>(r)], worst(r)});
+  for (Index r = 0; r < away.rows(); ++r) {
+    Index worst = 0;
+    away.row(r).cwiseAbs().maxCoeff(&worst);
+    if (std::abs(away(r, worst)) > kWild)
+      result.push_back({observations.name[static_cast<std::size_t>(r)], away(r, worst)});
+  }
   return result;
 }
 

@@ -1,5 +1,6 @@
 // Scatter that is not the same everywhere: a rotor's own, and runs that belong to no scatter.
 #include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation_parts.h"
 #include "analysis/residual/rotor_scatter.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
@@ -134,6 +135,19 @@ TEST_F(Scatter, SeveralGrossRunsDoNotHideEachOther) {
     EXPECT_TRUE(e.suspect_rows[k].set_aside);
   }
   EXPECT_EQ(e.verdict, "no_structure");
+}
+
+/// Half the speed in a few runs is a quarter of the thrust, and no slip of the hand.
+TEST_F(Scatter, WhatAllRotorsDoIsNotWild) {
+  Observations o = observations();
+  MatrixXd y = o.y;
+  for (const Index row : {11, 50, 77}) y.row(row).array() -= 1.4;
+  test::set_y(o, y);
+  EXPECT_TRUE(wild_runs(o).empty());
+  y(50, 1) -= 0.2;
+  test::set_y(o, y);
+  ASSERT_EQ(wild_runs(o).size(), 1u);
+  EXPECT_EQ(wild_runs(o)[0].row, o.name[50]);
 }
 
 }  // namespace
