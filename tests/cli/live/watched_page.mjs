@@ -8,7 +8,7 @@ const packages = createRequire(join(process.argv[3], 'packages.js'));
 export const {chromium} = packages('playwright-core');
 const axe = readFileSync(packages.resolve('axe-core/axe.min.js'), 'utf8');
 
-export const patience_ms = 20_000;  // other tests may have the processor
+export const patience_ms = 60_000;  // other tests may have the processor
 
 /** Opens an address: {page, complaints, requests}. */
 export async function open(browser, address, prepare = async () => {}) {
