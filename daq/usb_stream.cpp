@@ -27,11 +27,8 @@ struct UsbStream::State {
     State* state = nullptr;
     bool pending = false;
   };
-  struct Chunk {
-    std::vector<std::byte> bytes;
-    std::size_t used = 0;
-    double time_s = 0;
-    const char* cause = nullptr;
+  struct Chunk : Unread {
+    std::size_t used = 0;  // of its bytes
   };
 
   std::mutex mutex;
@@ -75,7 +72,7 @@ struct UsbStream::State {
   void take(const libusb_transfer& usb) {
     if (usb.actual_length <= 0) return;
     const auto* begin = reinterpret_cast<const std::byte*>(usb.buffer);
-    chunks.push_back({{begin, begin + usb.actual_length}, 0, steady_seconds(), cause});
+    chunks.push_back({{{begin, begin + usb.actual_length}, steady_seconds(), cause}});
     cause = nullptr;
     queued_bytes += static_cast<std::size_t>(usb.actual_length);
   }
@@ -216,9 +213,9 @@ std::vector<UsbStream::Unread> UsbStream::finish() {
   stop();
   const std::lock_guard lock(state_->mutex);
   std::vector<Unread> rest;
-  for (const State::Chunk& chunk : state_->chunks) {
-    const auto unread = std::span(chunk.bytes).subspan(chunk.used);
-    rest.push_back({{unread.begin(), unread.end()}, chunk.time_s, chunk.cause});
+  for (State::Chunk& chunk : state_->chunks) {
+    chunk.bytes.erase(chunk.bytes.begin(), chunk.bytes.begin() + static_cast<std::ptrdiff_t>(chunk.used));
+    rest.push_back(std::move(chunk));
   }
   state_->chunks.clear();
   return rest;

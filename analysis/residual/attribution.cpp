@@ -22,7 +22,7 @@ Attribution Search::run() {
   CurveScan curves = scan_curves();
   // Once more where rotors differ: what was found while they were taken to be alike may have been scatter.
   for (int again = 0;
-       again < 2 && (again == 0 || observations_.rotor_scatter.size() > 0) && begin_with_scatter_of(curves);
+       again < 2 && (again == 0 || observations_.scatter.rotors.size() > 0) && begin_with_scatter_of(curves);
        ++again) {
     add_effects();
     curves = scan_curves();
@@ -36,10 +36,9 @@ Attribution Search::run() {
 }
 
 void Search::begin() {
-  Observations as_given = given_;
-  as_given.run_correlation = observations_.run_correlation;
-  as_given.rotor_scatter = observations_.rotor_scatter;
-  observations_ = std::move(as_given);
+  RunScatter scatter = std::move(observations_.scatter);
+  observations_ = given_;
+  observations_.scatter = std::move(scatter);
   make_models();
   ways_ = all_ways(effects_, observations_, rows_);
   points_.clear();

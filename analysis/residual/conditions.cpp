@@ -158,13 +158,13 @@ void warn_of_changes_at_steps(const Observations& observations, Explanation& exp
 }
 
 void warn_of_scatter(const Observations& observations, Explanation& explanation) {
-  if (observations.rotor_scatter.size() > 0)
+  if (observations.scatter.rotors.size() > 0)
     explanation.warnings.push_back(
         fmt::format("rotors scatter unlike each other (over their geometric mean: {:.2f}): allowed for",
-                    fmt::join(observations.rotor_scatter, ", ")));
+                    fmt::join(observations.scatter.rotors, ", ")));
   constexpr std::array<std::string_view, 2> kOf = {"all rotors together", "one rotor against another"};
   for (std::size_t s = 0; s < kOf.size(); ++s) {
-    const double correlation = observations.run_correlation[s];
+    const double correlation = observations.scatter.run_correlation[s];
     if (correlation == 0) continue;
     explanation.warnings.push_back(
         fmt::format("neighbouring {} resemble each other (correlation {:.2f}{}{}): allowed for",

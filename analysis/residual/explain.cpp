@@ -205,8 +205,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   const Observations& wide = found.observations;
   // What the baseline is held against: the same, without what groups have of their own.
   Observations alone = observations;
-  alone.run_correlation = wide.run_correlation;
-  alone.rotor_scatter = wide.rotor_scatter;
+  alone.scatter = wide.scatter;
   report_untestable(alone, effects, rows, explanation);
   warn_of_scatter(wide, explanation);
   explanation.rounds = found.rounds;

@@ -11,14 +11,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// Orthonormal columns, the first along `first`.
+MatrixXd orthonormal_from(const VectorXd& first) {
+  MatrixXd columns = MatrixXd::Identity(first.size(), first.size());
+  columns.col(0) = first;
+  return Eigen::HouseholderQR<MatrixXd>(columns).householderQ();
+}
+
 /// Rotors that have something in common and each as much of its own: D^(−½) makes what they have of their own
 /// alike, and what they have in common a direction, which is the first mode.
 MatrixXd modes_of(const VectorXd& rotor_scatter) {
   const VectorXd one = rotor_scatter.cwiseInverse();
-  MatrixXd columns = MatrixXd::Identity(one.size(), one.size());
-  columns.col(0) = one;
-  const MatrixXd orthonormal = Eigen::HouseholderQR<MatrixXd>(columns).householderQ();
-  return one.asDiagonal() * orthonormal;
+  return one.asDiagonal() * orthonormal_from(one);
 }
 
 /// Mean of the rotors, then contrasts. Four rotors: sides, ends, and turning directions against each other.
@@ -28,9 +32,7 @@ MatrixXd orthonormal_modes(Index channels) {
     modes << 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, -1, 1, -1, -1, 1;
     return modes / 2;
   }
-  MatrixXd modes = MatrixXd::Identity(channels, channels);
-  modes.col(0).setConstant(1);
-  return Eigen::HouseholderQR<MatrixXd>(modes).householderQ();
+  return orthonormal_from(VectorXd::Ones(channels));
 }
 
 /// (Φ + a 11ᵀ)^(−½) = (I − share w wᵀ) A, block by block: A = Φ^(−½) takes from each run what the one before
@@ -101,7 +103,7 @@ void whiten(const std::vector<std::vector<Index>>& blocks, double session_ratio,
 
 MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
                        const std::vector<std::size_t>& ratio)
-    : MixedModel(observations, std::move(rows), ratio, observations.run_correlation) {}
+    : MixedModel(observations, std::move(rows), ratio, observations.scatter.run_correlation) {}
 
 MixedModel MixedModel::baseline_alone(const Observations& observations, std::vector<int> rows) {
   return {observations, std::move(rows), {0}, {0, 0}};
@@ -111,11 +113,11 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
                        const std::vector<std::size_t>& ratio, const std::array<double, 2>& run_correlation)
     : observations_(observations),
       rows_(std::move(rows)),
-      modes_(observations.rotor_scatter.size() > 0 ? modes_of(observations.rotor_scatter)
-                                                   : orthonormal_modes(observations.channels())),
+      modes_(observations.scatter.rotors.size() > 0 ? modes_of(observations.scatter.rotors)
+                                                    : orthonormal_modes(observations.channels())),
       run_correlation_(run_correlation) {
   if (modes_(0, 0) < 0) modes_ *= -1;
-  rotors_of_modes_ = observations.rotor_scatter.size() > 0 ? MatrixXd(modes_.inverse()) : modes_.transpose();
+  rotors_of_modes_ = observations.scatter.rotors.size() > 0 ? MatrixXd(modes_.inverse()) : modes_.transpose();
   for (std::size_t component = 0; component <= observations.shape.size(); ++component) {
     strata_.push_back({component, 0, 1});
     if (observations.channels() > 1)

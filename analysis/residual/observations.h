@@ -31,6 +31,14 @@ struct Covariate {
 /// A column of texts; an empty cell is a text as well.
 Covariate covariate_of_texts(const std::string& name, const std::vector<std::string>& texts);
 
+/// What the runs' scatter is like. Not known before the search has found it.
+struct RunScatter {
+  /// Of neighbouring runs of a block: what rotors have in common, what they differ by (run_correlation.h).
+  std::array<double, 2> run_correlation = {0, 0};
+  /// Each rotor's own over their geometric mean; empty: alike (rotor_scatter.h).
+  Eigen::VectorXd rotors = {};
+};
+
 /// n runs (rows of a table) by c channels (rotors; 1 for a table).
 ///
 /// Where the response has one sign the model is multiplicative: `y` is the logarithm of the response over
@@ -60,11 +68,7 @@ struct Observations {
   bool bare_thrust = false;  // it is a thrust, and the baseline does not have the density of the air
   bool groups_within_blocks =
       false;  // the block is the group: its baseline is estimated anew where it is held out
-  /// Of the scatter of neighbouring runs of a block: what rotors have in common, what they differ by. Not
-  /// known before the search has found it (run_correlation.h).
-  std::array<double, 2> run_correlation = {0, 0};
-  /// Of each rotor's own scatter over their geometric mean; empty: alike. Found likewise (rotor_scatter.h).
-  Eigen::VectorXd rotor_scatter;
+  RunScatter scatter;
 
   Eigen::VectorXd newtons_per_volt;  // c
   /// n: −1 where `value` is the magnitude of a response below zero, which effects are added to with its sign.

@@ -20,7 +20,7 @@ constexpr Index kFewestToCompare = 3;  // of two, nothing says which of them sca
 /// point.
 VectorXd own_variances(const MatrixXd& rotors, const std::vector<Index>& alike) {
   constexpr int kIterations = 30;
-  constexpr double kLeast = 0.05;  // of the mean: a single rotor's may be estimated as none
+  constexpr double kLeast = 0.05;  // of the second smallest: a single rotor's may be estimated as none
   VectorXd variance = VectorXd::Ones(rotors.cols());
   for (int i = 0; i < kIterations; ++i) {
     const VectorXd weight = variance.cwiseInverse();
@@ -28,7 +28,9 @@ VectorXd own_variances(const MatrixXd& rotors, const std::vector<Index>& alike) 
     const VectorXd size = (rotors.colwise() - mean).cwiseAbs().colwise().mean();
     variance = std::numbers::pi / 2 * size.array().square() + (i == 0 ? 0 : 1 / weight.sum());
     if (!alike.empty()) variance(alike).setConstant(VectorXd(variance(alike)).mean());
-    variance = variance.cwiseMax(kLeast * variance.mean());
+    VectorXd sorted = variance;
+    std::nth_element(sorted.begin(), sorted.begin() + 1, sorted.end());
+    variance = variance.cwiseMax(kLeast * sorted[1]);
   }
   return variance;
 }
@@ -39,60 +41,47 @@ VectorXd unlikeness(const MatrixXd& rotors, const std::vector<Index>& alike) {
   return VectorXd(log(alike)).array() - VectorXd(log(alike)).mean();
 }
 
-/// Residuals of the rotors but for what they have in common, one matrix per data set.
-class Differences {
- public:
-  Differences(const MixedModel& model, const NullFit& fit) : model_(model), fit_(fit) {
-    while (!model.strata()[stratum_].means() || model.strata()[stratum_].side() == 0) ++stratum_;
-  }
-  MatrixXd of(const Components& residual) const { return rotors(model_.stack(stratum_, {&residual})); }
-  std::vector<MatrixXd> simulated(std::mt19937_64& random) const {
-    Stacked drawn = model_.simulate(stratum_, std::vector<double>(kAlikeSets, 1.0),
-                                    std::vector<std::size_t>(kAlikeSets, fit_.ratio[stratum_]), 0, random);
-    std::vector<MatrixXd> result;
-    for (Index set = 0; set < drawn.cols(); ++set) result.push_back(rotors(drawn.col(set)));
-    return result;
-  }
+/// A data set of the stratum as residuals of the rotors but for what they have in common.
+MatrixXd differences(const MixedModel& model, std::size_t stratum, std::size_t ratio, Stacked column) {
+  model.project(stratum, ratio, column);
+  const Index modes = model.strata()[stratum].modes;
+  return Eigen::Map<const MatrixXd>(column.data(), column.size() / modes, modes) *
+         model.rotors_of_modes().bottomRows(modes);
+}
 
- private:
-  MatrixXd rotors(Stacked column) const {
-    model_.project(stratum_, fit_.ratio[stratum_], column);
-    const Index modes = model_.strata()[stratum_].modes;
-    return Eigen::Map<const MatrixXd>(column.data(), column.size() / modes, modes) *
-           model_.rotors_of_modes().bottomRows(modes);
-  }
-
-  const MixedModel& model_;
-  const NullFit& fit_;
-  std::size_t stratum_ = 0;
-};
+std::size_t differences_stratum(const MixedModel& model) {
+  std::size_t s = 0;
+  while (!model.strata()[s].means() || model.strata()[s].side() == 0) ++s;
+  return s;
+}
 
 }  // namespace
 
 VectorXd rotor_scatter(const Observations& observations, const std::vector<int>& rows,
                        const Components& residual, std::mt19937_64& random) {
   Observations seen = observations;
-  seen.rotor_scatter.resize(0);
-  seen.run_correlation = {0, 0};
+  seen.scatter = {};
   std::vector<Index> alike(static_cast<std::size_t>(observations.channels()));
   std::iota(alike.begin(), alike.end(), Index{0});
   while (static_cast<Index>(alike.size()) >= kFewestToCompare) {
     const MixedModel model(seen, rows);
     const NullFit fit = CandidateScan(model, {}, {}).null_fit(residual);
-    const Differences differences(model, fit);
-    const MatrixXd rotors = differences.of(residual);
+    const std::size_t s = differences_stratum(model), ratio = fit.ratio[s];
+    const MatrixXd rotors = differences(model, s, ratio, model.stack(s, {&residual}));
     Index most = 0;
     const double unlike = unlikeness(rotors, alike).cwiseAbs().maxCoeff(&most);
-    const std::vector<MatrixXd> simulated = differences.simulated(random);
-    if (std::any_of(simulated.begin(), simulated.end(), [&](const MatrixXd& set) {
-          return unlikeness(set, alike).cwiseAbs().maxCoeff() >= unlike;
-        }))
-      break;
+    const Stacked sets = model.simulate(s, std::vector<double>(kAlikeSets, 1.0),
+                                        std::vector<std::size_t>(kAlikeSets, ratio), 0, random);
+    bool by_chance = false;
+    for (Index i = 0; i < sets.cols() && !by_chance; ++i)
+      by_chance =
+          unlikeness(differences(model, s, ratio, sets.col(i)), alike).cwiseAbs().maxCoeff() >= unlike;
+    if (by_chance) break;
     alike.erase(alike.begin() + most);
     const VectorXd log = own_variances(rotors, alike).array().log();
-    seen.rotor_scatter = ((log.array() - log.mean()) / 2).exp();
+    seen.scatter.rotors = ((log.array() - log.mean()) / 2).exp();
   }
-  return seen.rotor_scatter;
+  return seen.scatter.rotors;
 }
 
 }  // namespace tunnelrig

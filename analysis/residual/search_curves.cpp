@@ -71,29 +71,28 @@ Components Search::rest_beside(const CurveScan& curves, double least_evidence) c
 }
 
 bool Search::begin_with_scatter_of(const CurveScan& curves) {
-  const bool known = observations_.rotor_scatter.size() > 0;
+  const RunScatter& before = observations_.scatter;
+  const bool known = before.rotors.size() > 0;
   // While a rotor that scatters more was taken for one like the others, the best curve had a part of its
   // scatter.
   const Components residual = rest_beside(curves, known ? critical_ : 0);
   std::mt19937_64 random(settings_.seed * 1000003 + 3000), other(settings_.seed * 1000003 + 4000);
-  Observations scattered = observations_;
-  scattered.rotor_scatter = rotor_scatter(observations_, rows_, residual, other);
-  scattered.run_correlation = {0, 0};
+  RunScatter scatter{.rotors = rotor_scatter(observations_, rows_, residual, other)};
   const auto correlation_in = [&](const MixedModel& model, const NullFit& variances) {
     return run_correlation(model, variances, residual, random);
   };
-  std::array<double, 2> correlation;
-  if (known || scattered.rotor_scatter.size() > 0) {
+  if (known || scatter.rotors.size() > 0) {
+    Observations scattered = observations_;
+    scattered.scatter = scatter;
     const MixedModel model(scattered, rows_);
-    correlation = correlation_in(model, CandidateScan(model, {}, {}).null_fit(residual));
+    scatter.run_correlation = correlation_in(model, CandidateScan(model, {}, {}).null_fit(residual));
   } else {
-    correlation = correlation_in(*mixed_, fit_.variances);
+    scatter.run_correlation = correlation_in(*mixed_, fit_.variances);
   }
-  if (are_alike(scattered.rotor_scatter, observations_.rotor_scatter) &&
-      (known || correlation == observations_.run_correlation))
+  if (are_alike(scatter.rotors, before.rotors) &&
+      (known || scatter.run_correlation == before.run_correlation))
     return false;
-  observations_.rotor_scatter = scattered.rotor_scatter;
-  observations_.run_correlation = correlation;
+  observations_.scatter = std::move(scatter);
   begin();
   return true;
 }

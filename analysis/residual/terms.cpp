@@ -135,7 +135,7 @@ std::vector<double> change_points(const Observations& observations, const std::v
 /// depends on the force of the run before would otherwise depend on that run's scatter, of which its group's
 /// constant has a part; all the more where a run's scatter goes with that of the run before.
 bool forces_differ(const Observations& observations) {
-  const bool correlated = observations.run_correlation != std::array<double, 2>{0, 0};
+  const bool correlated = observations.scatter.run_correlation != std::array<double, 2>{0, 0};
   const double least = correlated ? 40 : 3;  // variance over that of the constants' errors
   double variance = 0, noise = 0;
   const double n = static_cast<double>(observations.rows()), groups = observations.groups();

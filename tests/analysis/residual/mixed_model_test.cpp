@@ -32,7 +32,7 @@ struct MixedModelTest : testing::TestWithParam<Case> {
   std::vector<int> rows, others;
 
   MixedModelTest() {
-    observations.run_correlation = GetParam().run_correlation;
+    observations.scatter.run_correlation = GetParam().run_correlation;
     for (int row = 0; row < static_cast<int>(observations.rows()); ++row)
       (row > 4 && row % 5 == 0 ? others : rows).push_back(row);
   }

@@ -48,12 +48,12 @@ struct Scatter : testing::Test {
 /// Own scatters and a part that is the same in all: the modes are uncorrelated, the differences alike.
 TEST_F(Scatter, ModesMakeRotorsAlike) {
   Observations o = observations();
-  o.rotor_scatter.resize(4);
-  o.rotor_scatter << 0.5, 1, 3, 0.8;
+  o.scatter.rotors.resize(4);
+  o.scatter.rotors << 0.5, 1, 3, 0.8;
   const MixedModel model(o, o.all_rows());
   const MatrixXd& modes = model.mode_matrix();
   MatrixXd covariance = MatrixXd::Constant(4, 4, 2.0);
-  covariance.diagonal() += o.rotor_scatter.cwiseAbs2();
+  covariance.diagonal() += o.scatter.rotors.cwiseAbs2();
   const MatrixXd of_modes = modes.transpose() * covariance * modes;
   EXPECT_LT((of_modes - MatrixXd(of_modes.diagonal().asDiagonal())).cwiseAbs().maxCoeff(), 1e-12);
   EXPECT_LT((of_modes.diagonal().tail(3).array() - 1).abs().maxCoeff(), 1e-12);
@@ -61,6 +61,11 @@ TEST_F(Scatter, ModesMakeRotorsAlike) {
   EXPECT_GT(alike(0), 0);
   EXPECT_LT(alike.tail(3).cwiseAbs().maxCoeff(), 1e-12);
   EXPECT_LT((modes * model.rotors_of_modes() - MatrixXd::Identity(4, 4)).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+/// Of the third rotor, over the others' geometric mean.
+double over_others(const VectorXd& scatter) {
+  return scatter(2) / std::cbrt(scatter(0) * scatter(1) * scatter(3));
 }
 
 TEST_F(Scatter, OfOneRotorIsFoundAndOfAlikeRotorsNot) {
@@ -75,11 +80,19 @@ TEST_F(Scatter, OfOneRotorIsFoundAndOfAlikeRotorsNot) {
     if (scatter.size() == 0) continue;
     ++differ;
     EXPECT_NEAR(scatter.prod(), 1, 1e-9);
-    ratio += scatter(2) / std::cbrt(scatter(0) * scatter(1) * scatter(3)) / kCampaigns;
+    ratio += over_others(scatter) / kCampaigns;
   }
   EXPECT_LE(alike_differ, 3) << "0.5 % of 40 are expected";
   EXPECT_EQ(differ, kCampaigns);
   EXPECT_NEAR(ratio, 4, 0.6);
+}
+
+TEST_F(Scatter, OfACellThatIsLooseIsMeasuredAsWell) {
+  Observations o = observations();
+  let_scatter_more(o, 2, 30);
+  const VectorXd scatter = found(o);
+  ASSERT_EQ(scatter.size(), 4);
+  EXPECT_NEAR(over_others(scatter), 30, 5);
 }
 
 TEST_F(Scatter, OfOneRotorIsSaidAndIsNoStructure) {

@@ -129,7 +129,7 @@ TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
     settings.seed = static_cast<std::uint64_t>(i + 1);
     const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
     said += found.accepted.empty() && found.curves.empty() ? 0 : 1;
-    seen += found.observations.run_correlation[1] > 0.4 ? 1 : 0;
+    seen += found.observations.scatter.run_correlation[1] > 0.4 ? 1 : 0;
   }
   std::cout << said << " of " << kCampaigns << " with structure, " << seen << " with the correlation\n";
   EXPECT_LE(said, 7) << "binomial (40, 0.06): beyond 7 in 0.2 % of cases";
