@@ -39,7 +39,8 @@ ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Obse
                     .coefficients = {amplitude.data(), amplitude.data() + amplitude.size()},
                     .tilt = curve.tilt,
                     .levels = curve.levels,
-                    .labels = curve.labels};
+                    .labels = curve.labels,
+                    .place = curve.place.name};
   // The mean over the runs is the baseline's: without it the curve would shift every coefficient.
   const Covariate& covariate = *observations.find(curve.covariate);
   const Index rotor = std::max(curve.rotor, 0);

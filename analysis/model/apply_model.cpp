@@ -46,6 +46,7 @@ class Forward {
       first_curve_.push_back(next);
       next += static_cast<Index>(curve.coefficients.size());
       curve_covariates_.push_back(observations.find(curve.covariate));
+      curve_places_.push_back(observations.find_place(curve.place));
     }
     predict_forces();
   }
@@ -190,8 +191,9 @@ class Forward {
       const ModelCurve& curve = model_.curves[k];
       if (curve.rotor >= 0 && channel != curve.rotor) continue;
       const double x = std::clamp(condition(k, row, channel), curve.low, curve.high);
+      const double weight = curve_places_[k] == nullptr ? 1 : curve_places_[k]->weight(row);
       for (std::size_t b = 0; b < curve.coefficients.size(); ++b)
-        sum += parameters(first_curve_[k] + static_cast<Index>(b)) * curve.column(b, x);
+        sum += weight * parameters(first_curve_[k] + static_cast<Index>(b)) * curve.column(b, x);
     }
     return sum;
   }
@@ -201,6 +203,7 @@ class Forward {
   std::vector<Index> first_, first_curve_;
   std::vector<std::vector<const Covariate*>> term_covariates_;
   std::vector<const Covariate*> curve_covariates_;
+  std::vector<const Place*> curve_places_;  // null: alike everywhere
   MatrixXd predicted_;
 };
 

@@ -1,5 +1,6 @@
 #include "analysis/model/model_version.h"
 
+#include "analysis/residual/observations.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -139,6 +140,7 @@ Json curve_json(const ModelCurve& curve) {
             {"tilt", curve.tilt}};
   if (!curve.levels.empty()) json["levels"] = curve.levels;
   if (!curve.labels.empty()) json["labels"] = curve.labels;
+  if (!curve.place.empty()) json["place"] = curve.place;
   return json;
 }
 
@@ -159,7 +161,8 @@ ModelCurve curve_of(const Reader& reader) {
                    .centre = reader.numbers("centre"),
                    .tilt = reader.has("tilt") ? reader.numbers("tilt") : std::vector<double>(),
                    .levels = reader.has("levels") ? reader.numbers("levels") : std::vector<double>(),
-                   .labels = reader.has("labels") ? reader.texts("labels") : std::vector<std::string>()};
+                   .labels = reader.has("labels") ? reader.texts("labels") : std::vector<std::string>(),
+                   .place = reader.has("place") ? reader.text("place") : std::string()};
   if (curve.covariate == "start_utc") curve.covariate = "hours_in_session";  // as it was called at first
   if (!(curve.high > curve.low)) reader.fail("has no range: high is not above low");
   if (is_of_logarithm(curve.shape) && !(curve.low > 0))
@@ -168,6 +171,8 @@ ModelCurve curve_of(const Reader& reader) {
     reader.fail("has not as many coefficients as values of centre");
   if ((curve.shape == CurveShape::kLevels ? curve.coefficients.size() + 1 : 0) != curve.levels.size())
     reader.fail("needs one level more than coefficients, and no levels where its shape is another");
+  if (!curve.place.empty() && std::find(kPlaces.begin(), kPlaces.end(), curve.place) == kPlaces.end())
+    reader.fail(fmt::format("goes with the place {}, which this program does not know", curve.place));
   if (!curve.tilt.empty() && curve.tilt.size() != curve.coefficients.size())
     reader.fail("has not as many coefficients as values of tilt");
   return curve;
@@ -208,7 +213,7 @@ double ModelCurve::column(std::size_t k, double x) const {
 }
 
 std::string ModelCurve::label() const {
-  return fmt::format("curve over {}{} (empirical)", covariate,
+  return fmt::format("curve over {}{}{} (empirical)", covariate, place.empty() ? "" : " × " + place,
                      rotor < 0 ? "" : fmt::format(" of rotor {}", rotor + 1));
 }
 

@@ -37,6 +37,7 @@ struct ModelCurve {
   std::vector<double> tilt = {};         // empty: none
   std::vector<double> levels = {};       // of CurveShape::kLevels, one more than coefficients
   std::vector<std::string> labels = {};  // of a column of texts: x = i + 1 stands for labels[i]
+  std::string place = {};                // times the run's weight there (Place); empty: alike everywhere
 
   double column(std::size_t k, double x) const;  // of the k-th coefficient, from 0, with tilt and centre
   std::string label() const;                     // "curve over relative_humidity (empirical)"

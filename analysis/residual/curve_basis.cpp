@@ -6,7 +6,8 @@
 namespace tunnelrig {
 
 bool is_of_logarithm(CurveShape shape) {
-  return shape == CurveShape::kLogParabola || shape == CurveShape::kLevelling;
+  return shape == CurveShape::kLogParabola || shape == CurveShape::kLevelling ||
+         shape == CurveShape::kLogStraight;
 }
 
 double curve_straight(CurveShape shape, double x, double low, double high) {
@@ -17,7 +18,7 @@ double curve_straight(CurveShape shape, double x, double low, double high) {
 double curve_column(CurveShape shape, int k, double x, double low, double high) {
   if (shape == CurveShape::kWaves) return std::cos(std::numbers::pi * k * (x - low) / (high - low));
   const double straight = curve_straight(shape, x, low, high);
-  if (k > 1) return straight;
+  if (k > 1 || shape == CurveShape::kStraight || shape == CurveShape::kLogStraight) return straight;
   return shape == CurveShape::kLevelling ? low / x : straight * straight;
 }
 
@@ -41,6 +42,10 @@ std::string_view name_of(CurveShape shape) {
       return "log_parabola";
     case CurveShape::kLevelling:
       return "levelling";
+    case CurveShape::kStraight:
+      return "straight";
+    case CurveShape::kLogStraight:
+      return "log_straight";
     case CurveShape::kLevels:
       return "levels";
   }
@@ -48,8 +53,9 @@ std::string_view name_of(CurveShape shape) {
 }
 
 std::optional<CurveShape> curve_shape(std::string_view name) {
-  for (const CurveShape shape : {CurveShape::kWaves, CurveShape::kParabola, CurveShape::kLogParabola,
-                                 CurveShape::kLevelling, CurveShape::kLevels})
+  for (const CurveShape shape :
+       {CurveShape::kWaves, CurveShape::kParabola, CurveShape::kLogParabola, CurveShape::kLevelling,
+        CurveShape::kStraight, CurveShape::kLogStraight, CurveShape::kLevels})
     if (name_of(shape) == name) return shape;
   return {};
 }

@@ -12,6 +12,8 @@ enum class CurveShape {
   kParabola,     // s², s = 2u − 1: what a straight line lacks; s where it stands alone
   kLogParabola,  // the same over ln x: what a power law lacks
   kLevelling,    // low/x, with s of ln x: the same, but less and less where x grows
+  kStraight,     // s
+  kLogStraight,  // the same over ln x
   kLevels,       // 1 at one of few values: what differs from the most common of them
 };
 
@@ -31,7 +33,7 @@ double tilted_column(CurveShape shape, const std::vector<double>& tilt, std::siz
 /// The k-th column (from 1) of levels: whether x is levels[k].
 double level_column(const std::vector<double>& levels, int k, double x);
 
-/// "waves", "parabola", "log_parabola", "levelling", "levels".
+/// "waves", "parabola", "log_parabola", "levelling", "straight", "log_straight", "levels".
 std::string_view name_of(CurveShape shape);
 std::optional<CurveShape> curve_shape(std::string_view name);
 

@@ -20,6 +20,10 @@ constexpr std::array<int, 3> kBends = {2, 4, 6};
 /// A value of few is told apart if as many blocks have it as a step needs on either side.
 constexpr std::size_t kBlocksPerLevel = 3, kMostLevels = 12;
 
+/// That a condition does different things in different places is less likely beforehand than that it does
+/// one.
+constexpr double kPlaceWeight = 0.2;
+
 Components nothing(const Observations& observations) {
   return Components(1 + observations.shape.size(),
                     MatrixXd::Zero(observations.rows(), observations.channels()));
@@ -50,11 +54,14 @@ std::vector<Components> course(const Observations& observations, int rotor) {
   return columns;
 }
 
-/// Where the covariate is a ratio a power law is what is straight.
+/// Whether a power law is what is straight.
+bool is_ratio(const Observations& observations, const Covariate& covariate) {
+  return observations.multiplicative && !covariate.derived && !covariate.name.ends_with("_C") &&
+         covariate.value.minCoeff() > 0;
+}
+
 std::vector<CurveShape> bends_over(const Observations& observations, const Covariate& covariate) {
-  const bool ratio = observations.multiplicative && !covariate.derived && !covariate.name.ends_with("_C") &&
-                     covariate.value.minCoeff() > 0;
-  if (ratio) return {CurveShape::kLogParabola, CurveShape::kLevelling};
+  if (is_ratio(observations, covariate)) return {CurveShape::kLogParabola, CurveShape::kLevelling};
   return {CurveShape::kParabola};
 }
 
@@ -81,6 +88,37 @@ MatrixXd straight_over(const Curve& curve) {
   return straight;
 }
 
+/// Whether the place differs between `rows`, and not as one before it does.
+bool tells_rows_apart(const std::vector<Place>& places, std::size_t i, const std::vector<int>& rows) {
+  const Eigen::VectorXd weight = places[i].weight(rows);
+  if (!(weight.maxCoeff() > weight.minCoeff())) return false;
+  return std::none_of(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(i),
+                      [&](const Place& before) { return before.weight(rows).isApprox(weight); });
+}
+
+/// Slopes over a condition that go with the place.
+void add_slopes_by_place(const Observations& observations, const Covariate& covariate,
+                         const std::vector<int>& rotors, const std::vector<int>& rows,
+                         std::vector<Curve>& curves) {
+  const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff();
+  const CurveShape shape =
+      is_ratio(observations, covariate) ? CurveShape::kLogStraight : CurveShape::kStraight;
+  const auto straight = [&](int k, double x) { return curve_column(shape, k, x, low, high); };
+  for (std::size_t i = 0; i < observations.places.size(); ++i) {
+    if (!tells_rows_apart(observations.places, i, rows)) continue;
+    for (const int rotor : rotors) {
+      curves.push_back({.covariate = covariate.name,
+                        .rotor = rotor,
+                        .shape = shape,
+                        .columns = columns_over(observations, covariate, rotor, 1, straight),
+                        .x = covariate.value,
+                        .place = observations.places[i]});
+      MatrixXd& column = curves.back().columns[0][0];
+      column = observations.places[i].weight.asDiagonal() * column;
+    }
+  }
+}
+
 /// Whether another condition of the runs goes with it: sessions that all begin at one hour.
 bool repeats_another(const Observations& observations, const Covariate& covariate) {
   constexpr double kSame = 0.99;  // correlation
@@ -94,7 +132,12 @@ bool repeats_another(const Observations& observations, const Covariate& covariat
 }  // namespace
 
 std::string Curve::label() const {
-  return rotor < 0 ? covariate : covariate + fmt::format(" of rotor {}", rotor + 1);
+  return covariate + (place.name.empty() ? "" : " × " + place.name) +
+         (rotor < 0 ? "" : fmt::format(" of rotor {}", rotor + 1));
+}
+
+bool Curve::is_like(const Curve& other) const {
+  return covariate == other.covariate && rotor == other.rotor && place.name == other.place.name;
 }
 
 double correlation(const Covariate& first, const Covariate& second) {
@@ -172,6 +215,7 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
                           .columns = columns_over(observations, covariate, rotor, count, column_at),
                           .x = covariate.value});
     };
+    add_slopes_by_place(observations, covariate, rotors, rows, curves);
     if (most >= 1)
       for (const CurveShape bend : bends_over(observations, covariate)) add(bend, 1);
     // Where a whole wave finds no row its height is anything.
@@ -220,14 +264,16 @@ Curve with_trend(const Curve& curve) {
 }
 
 bool is_bend_over(const Curve& curve, const std::vector<std::string>& covariates, int rotor) {
-  return curve.columns.size() == 1 && curve.shape != CurveShape::kLevels && curve.x.size() > 0 &&
-         curve.rotor == rotor && is_over(curve, covariates);
+  return curve.columns.size() == 1 && curve.shape != CurveShape::kLevels && curve.place.name.empty() &&
+         curve.x.size() > 0 && curve.rotor == rotor && is_over(curve, covariates);
 }
 
 Candidate as_candidate(const Curve& curve) {
   // Rotors alone are as likely together as all of them alike, as with named effects.
   const auto channels = static_cast<double>(curve.columns[0][0].cols());
-  return {.columns = curve.columns, .sign = 0, .weight = curve.rotor < 0 ? 1 : 1 / channels};
+  return {.columns = curve.columns,
+          .sign = 0,
+          .weight = (curve.rotor < 0 ? 1 : 1 / channels) * (curve.place.name.empty() ? 1 : kPlaceWeight)};
 }
 
 }  // namespace tunnelrig

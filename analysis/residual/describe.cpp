@@ -64,6 +64,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   UnknownStructure result{.covariate = found.curve.covariate,
                           .condition = found.curve.covariate,
                           .covariate_unit = {},
+                          .place = found.curve.place.name,
                           .rotor = found.curve.rotor,
                           .p_value = found.p,
                           .shape = {},
@@ -79,7 +80,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   Index first = static_cast<Index>(fit.linear.columns.size());
   for (auto curve = fit.model.curves.rbegin(); curve != fit.model.curves.rend(); ++curve) {
     first -= static_cast<Index>(curve->columns.size());
-    if (curve->covariate == found.curve.covariate && curve->rotor == found.curve.rotor) break;
+    if (curve->is_like(found.curve)) break;
   }
   const Index k = static_cast<Index>(found.curve.columns.size());
   const VectorXd amplitude = amplitudes.amplitude.segment(first, k);
@@ -114,6 +115,7 @@ UnknownStructure describe_sessions(const Observations& observations, const Matri
   UnknownStructure result{.covariate = "session",
                           .condition = "session",
                           .covariate_unit = {},
+                          .place = {},
                           .p_value = 0.025,
                           .shape = {},
                           .labels = {},

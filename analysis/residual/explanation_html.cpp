@@ -193,7 +193,8 @@ class Page {
 
   void add_unknown(const UnknownStructure& unknown, Json& list) const {
     for (const Curve& curve : explanation_.model.curves) {
-      if (curve.covariate != unknown.condition || curve.rotor != unknown.rotor || curve.x.size() == 0)
+      if (curve.covariate != unknown.condition || curve.rotor != unknown.rotor ||
+          curve.place.name != unknown.place || curve.x.size() == 0)
         continue;
       MatrixXd shape = MatrixXd::Zero(observations_.rows(), observations_.channels());
       for (Index row = 0; row < shape.rows(); ++row)
@@ -202,6 +203,7 @@ class Page {
             shape(row, c) = unknown.levels
                                 ? at_level(unknown.shape, curve.x(row, 0), curve.levels[0])
                                 : interpolated(unknown.shape, curve.x(row, curve.x.cols() > 1 ? c : 0));
+      if (curve.place.weight.size() > 0) shape = curve.place.weight.asDiagonal() * shape;
       list.push_back(
           panel("unknown: " + curve.label(), curve.covariate, curve.x, curve.rotor, visible(shape)));
       return;

@@ -57,6 +57,7 @@ Json unknown_json(const UnknownStructure& unknown) {
     shape.push_back({finite(point.x), finite(point.y), finite(point.low), finite(point.high)});
   return {{"covariate", unknown.covariate},
           {"covariate_unit", unknown.covariate_unit},
+          {"place", unknown.place.empty() ? Json(nullptr) : Json(unknown.place)},
           {"rotor", rotor_json(unknown.rotor)},
           {"p_value", finite(unknown.p_value)},
           {"amplitude", finite(unknown.amplitude)},
@@ -78,6 +79,11 @@ std::string levels_in_words(const UnknownStructure& unknown, const std::string& 
     text += fmt::format("{}{} {:+.3g} ± {:.2g}", text.empty() ? "" : ", ", name_of_value(unknown, point.x),
                         point.y, (point.high - point.low) / 2);
   return text + unit;
+}
+
+std::string place_in_words(const std::string& place) {
+  if (place == "tunnel") return "in the tunnel, compared with open space";
+  return fmt::format("in proportion to {} of the location; drawn as it is at {} = 1", place, place);
 }
 
 std::string parameters_in_words(const AdoptedEffect& adopted) {
@@ -198,6 +204,7 @@ std::string explanation_text(const Explanation& e) {
                         plain ? "" : " [" + u.covariate_unit + "]",
                         u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit,
                         u.p_value);
+    if (!u.place.empty()) text += fmt::format("    {}\n", place_in_words(u.place));
     if (u.levels) text += wrapped("  " + levels_in_words(u, unit));
     if (!u.instead_of.empty())
       text += fmt::format("    in which it bends away from the formula of {}\n", joined(u.instead_of));

@@ -9,6 +9,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -30,6 +31,15 @@ struct Covariate {
 
 /// A column of texts; an empty cell is a text as well.
 Covariate covariate_of_texts(const std::string& name, const std::vector<std::string>& texts);
+
+/// Of the places below: 1 in the tunnel; how far to the side, how high, and how near to either wall.
+inline constexpr std::array<std::string_view, 4> kPlaces = {"tunnel", "y_norm", "z_norm", "|y_norm|"};
+
+/// What an effect may go with from one location to another: it is so many times as strong.
+struct Place {
+  std::string name = {};        // one of kPlaces; empty: alike everywhere
+  Eigen::VectorXd weight = {};  // n, −1 to 1; 0 in open space
+};
 
 /// What the runs' scatter is like. Not known before the search has found it.
 struct RunScatter {
@@ -69,6 +79,7 @@ struct Observations {
   bool groups_within_blocks =
       false;  // the block is the group: its baseline is estimated anew where it is held out
   RunScatter scatter;
+  std::vector<Place> places;  // none in tables
 
   Eigen::VectorXd newtons_per_volt;  // c
   /// n: −1 where `value` is the magnitude of a response below zero, which effects are added to with its sign.
@@ -91,6 +102,12 @@ struct Observations {
   const Covariate* find(std::string_view wanted) const {
     for (const Covariate& covariate : covariates)
       if (covariate.name == wanted) return &covariate;
+    return nullptr;
+  }
+
+  const Place* find_place(std::string_view wanted) const {
+    for (const Place& place : places)
+      if (place.name == wanted) return &place;
     return nullptr;
   }
 

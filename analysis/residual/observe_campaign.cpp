@@ -215,6 +215,20 @@ void set_belonging(const Source& source, Observations& result) {
   }
 }
 
+void add_places(const Source& source, Observations& result) {
+  Eigen::VectorXd tunnel = Eigen::VectorXd::Zero(source.rows()), y = tunnel, z = tunnel;
+  for (Index row = 0; row < source.rows(); ++row) {
+    const Run& run = source.run(row);
+    if (!run.in_tunnel()) continue;
+    tunnel(row) = 1;
+    y(row) = *run.y_norm;
+    z(row) = *run.z_norm;
+  }
+  const std::array<Eigen::VectorXd, kPlaces.size()> weights = {tunnel, y, z, y.cwiseAbs()};
+  for (std::size_t i = 0; i < kPlaces.size(); ++i)
+    result.places.push_back({std::string(kPlaces[i]), weights[i]});
+}
+
 struct Response {
   int channels = 1;
   std::string unit;
@@ -306,6 +320,7 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
   if (!all_runs) leave_out_against_sign(source, response, result);
   set_response(source, response, result);
   set_belonging(source, result);
+  add_places(source, result);
   result.slopes.resize(source.rows(), 0);
   result.duration_s = Eigen::VectorXd::Zero(source.rows());
   for (Index row = 0; row < source.rows(); ++row)

@@ -42,7 +42,8 @@ Search::CurveScan Search::scan_curves() const {
   for (const Curve& each : curves_) {
     if (is_described(each)) continue;
     const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
-      return a.term.rotor == each.rotor && is_over(each, a.term.effect->covariates);
+      return each.place.name.empty() && a.term.rotor == each.rotor &&
+             is_over(each, a.term.effect->covariates);
     });
     // What is straight over few values has a name then, and the bends ask for the rest.
     if (named && each.shape == CurveShape::kLevels) continue;
@@ -116,7 +117,7 @@ bool Search::add_best_curve(const CurveScan& curves) {
 
 bool Search::is_described(const Curve& curve) const {
   return std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
-    return found.curve.covariate == curve.covariate &&
+    return found.curve.covariate == curve.covariate && found.curve.place.name == curve.place.name &&
            (found.curve.rotor < 0 || found.curve.rotor == curve.rotor);
   });
 }
@@ -212,8 +213,9 @@ bool Search::is_work_of_a_curve(const Term& term) const {
              return other != nullptr && !observations_.not_usable.contains(name) &&
                     other->value.maxCoeff() > other->value.minCoeff();
            };
-           return found.curve.tilt.empty() && found.curve.rotor == term.rotor &&
-                  is_over(found.curve, names) && std::none_of(names.begin(), names.end(), varies_beside_it);
+           return found.curve.place.name.empty() && found.curve.tilt.empty() &&
+                  found.curve.rotor == term.rotor && is_over(found.curve, names) &&
+                  std::none_of(names.begin(), names.end(), varies_beside_it);
          });
 }
 

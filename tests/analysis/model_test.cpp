@@ -135,6 +135,28 @@ TEST(ApplyModel, LevelsHoldWhereTheyWereSeenOnly) {
               HasSubstr("one level more than coefficients"));
 }
 
+TEST(ApplyModel, ACurveOfAPlaceIsWeightedByIt) {
+  ModelVersion model{.version = 1, .explanation = "{}"};
+  model.curves = {{.covariate = "clip",
+                   .shape = CurveShape::kStraight,
+                   .low = 0.1,
+                   .high = 0.4,
+                   .coefficients = {0.02},
+                   .centre = {0.5},
+                   .place = "tunnel"}};
+  model.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-6);
+  const CampaignData data = four_runs();
+  const Reduction reduction = corrected(data, model_from_json(model_json(model), "it"));
+  const auto ratio = [&](std::size_t run) {
+    return reduction.runs[run].thrust_N[2] / *data.runs[run].thrust_N[2];
+  };
+  EXPECT_NEAR(ratio(0), std::exp(-0.02 * (-1 - 0.5)), 1e-12);
+  EXPECT_EQ(ratio(3), 1) << "in open space";
+  model.curves[0].place = "cellar";
+  EXPECT_THAT(message_of([&] { model_from_json(model_json(model), "it"); }),
+              HasSubstr("goes with the place cellar, which this program does not know"));
+}
+
 TEST(ApplyModel, ARunWithoutTheCovariateIsLeftOutWithTheReason) {
   CampaignData data = four_runs();
   data.runs[1].numbers.erase("air_pressure_Pa");
@@ -197,7 +219,8 @@ TEST(ModelVersion, IsReadAsItWasWritten) {
        .low = 1,
        .high = 2,
        .coefficients = {3},
-       .centre = {0.4}}};
+       .centre = {0.4},
+       .place = "z_norm"}};
   model.covariance = 0.5 * Eigen::MatrixXd::Identity(7, 7);
   model.covariance(1, 0) = model.covariance(0, 1) = 1.0 / 3;
   const ModelVersion read = model_from_json(model_json(model), "m");
