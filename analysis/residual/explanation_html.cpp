@@ -19,6 +19,7 @@ using Eigen::VectorXd;
 using Json = nlohmann::ordered_json;
 
 constexpr int kCoursePoints = 41;
+constexpr double kLeastShown = 0.5;  // weight of a place
 
 /// As many digits as a picture shows; what is not known is null.
 Json drawn(double value) {
@@ -137,26 +138,31 @@ class Page {
     return by_mode * mixed.rotors_of_modes();
   }
 
-  /// Points of one covariate: the residual with everything else in, and what this term makes of it.
+  /// Points of one covariate: the residual with everything else in, and what this term makes of it. Of a
+  /// place: runs where it counts by half or more, turned round where it is below zero.
   Json panel(const std::string& label, const std::string& covariate, const MatrixXd& x, int rotor,
-             const MatrixXd& fitted) const {
+             const MatrixXd& fitted, const Place& place = {}) const {
     const Covariate* known = observations_.find(covariate);
     Json json{{"label", label},
               {"covariate", covariate},
               {"covariate_unit", known == nullptr ? "" : known->unit},
               {"labels", known == nullptr ? std::vector<std::string>{} : known->labels},
+              {"place", place.name},
               {"rotor", rotor_number(rotor)}};
     for (Index c = 0; c < observations_.channels(); ++c) {
       if (rotor >= 0 && c != rotor) continue;
       for (const int row : rows_) {
         const double at = x(row, x.cols() > 1 ? c : 0);
         if (!std::isfinite(at) || !std::isfinite(after_(row, c))) continue;
+        const double weight = place.name.empty() ? 1 : place.weight(row);
+        if (std::abs(weight) < kLeastShown) continue;
+        const double side = weight < 0 ? -1 : 1;
         json["run"].push_back(row);
         json["channel"].push_back(c + 1);
         json["x"].push_back(drawn(at));
-        json["before"].push_back(drawn(after_(row, c) + fitted(row, c)));
-        json["after"].push_back(drawn(after_(row, c)));
-        json["fitted"].push_back(drawn(fitted(row, c)));
+        json["before"].push_back(drawn(side * (after_(row, c) + fitted(row, c))));
+        json["after"].push_back(drawn(side * after_(row, c)));
+        json["fitted"].push_back(drawn(side * fitted(row, c)));
       }
     }
     return json;
@@ -204,8 +210,8 @@ class Page {
                                 ? at_level(unknown.shape, curve.x(row, 0), curve.levels[0])
                                 : interpolated(unknown.shape, curve.x(row, curve.x.cols() > 1 ? c : 0));
       if (curve.place.weight.size() > 0) shape = curve.place.weight.asDiagonal() * shape;
-      list.push_back(
-          panel("unknown: " + curve.label(), curve.covariate, curve.x, curve.rotor, visible(shape)));
+      list.push_back(panel("unknown: " + curve.label(), curve.covariate, curve.x, curve.rotor, visible(shape),
+                           curve.place));
       return;
     }
     if (unknown.covariate == "session") {

@@ -117,9 +117,14 @@ const labelsText = ({shape, labels = []}, unit) => labels.length === 0 ?
     '' :
     ` ${shape.map(([x, y]) => `${nameOfText(labels[x - 1])} ${digits(y)}`).join(', ')}${unitSuffix(unit)}.`;
 
+/** What a slope that goes with the place does where. */
+const placeText = (place) => place === 'tunnel' ? ' in the tunnel, compared with open space' :
+    place                                       ? ` in proportion to \`${place}\` of the location (amplitude: where that is 1)` :
+                                                  '';
+
 const unknownText = (unknown, unit) => {
-  const {covariate, rotor, amplitude, p_value: p, instead_of: insteadOf = []} = unknown;
-  return `Depends on \`${covariate}\`${rotor ? ` at rotor ${rotor}` : ''}: amplitude ${digits(amplitude)}${
+  const {covariate, place, rotor, amplitude, p_value: p, instead_of: insteadOf = []} = unknown;
+  return `Depends on \`${covariate}\`${rotor ? ` at rotor ${rotor}` : ''}${placeText(place)}: amplitude ${digits(amplitude)}${
       unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${labelsText(unknown, unit)}${
       insteadOf.length ? ` It bends away from the formula of ${insteadOf.join(', ')}.` : ''}`;
 };

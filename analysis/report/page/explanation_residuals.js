@@ -147,7 +147,10 @@ function panelFigure(panel, made) {
       sentences(
           `Grey: every run, ${of}; blue: means of runs of like ${panel.covariate} with 95 % intervals`,
           'from the runs’ scatter; orange: what the fitted model makes of it for the same runs, without what the baseline’s',
-          'own coefficients absorb. Left: everything else that was found is taken out. Right: this too.');
+          'own coefficients absorb. Left: everything else that was found is taken out. Right: this too.',
+          panel.place ?
+              `Only runs where ${panel.place} is 0.5 or more; below −0.5 too, with the sign of what was measured turned round.` :
+              '');
   const plots = session ? one('after', 'sessions') :
                           h('div', {class: 'pair'}, one('before', 'before'), one('after', 'after'));
   return figure(`${panel.label}, against ${panel.covariate}`, [], plots, caption, made);
