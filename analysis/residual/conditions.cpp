@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -157,11 +158,37 @@ void warn_of_changes_at_steps(const Observations& observations, Explanation& exp
       }
 }
 
+/// Of numbers that rows have: the names of those whose every row scatters more than most.
+std::vector<std::string> that_scatter(const Eigen::VectorXd& scatter, const std::vector<int>& number,
+                                      const std::vector<std::string>& name) {
+  std::vector<double> least(name.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t row = 0; row < number.size(); ++row) {
+    double& of = least[static_cast<std::size_t>(number[row])];
+    of = std::min(of, scatter(static_cast<Eigen::Index>(row)));
+  }
+  std::vector<std::string> result;
+  for (std::size_t i = 0; i < name.size(); ++i)
+    if (least[i] > 1 && std::isfinite(least[i])) result.push_back(name[i]);
+  return result;
+}
+
+/// "runs at H2V0, H3V-1 scatter up to 8.3 times more than most"
+std::string wilder_runs(const Observations& observations) {
+  const Eigen::VectorXd& scatter = observations.scatter.runs;
+  std::vector<std::string> names = that_scatter(scatter, observations.group, observations.group_name);
+  for (const std::string& session : that_scatter(scatter, observations.block, observations.block_name))
+    names.push_back("session " + session);
+  return fmt::format("runs at {} scatter more than most, up to {:.2g} times", fmt::join(names, ", "),
+                     scatter.maxCoeff());
+}
+
 void warn_of_scatter(const Observations& observations, Explanation& explanation) {
   if (observations.scatter.rotors.size() > 0)
     explanation.warnings.push_back(
         fmt::format("rotors scatter unlike each other (over their geometric mean: {:.2f}): allowed for",
                     fmt::join(observations.scatter.rotors, ", ")));
+  if (observations.scatter.runs.size() > 0)
+    explanation.warnings.push_back(fmt::format("{}: allowed for", wilder_runs(observations)));
   constexpr std::array<std::string_view, 2> kOf = {"all rotors together", "one rotor against another"};
   for (std::size_t s = 0; s < kOf.size(); ++s) {
     const double correlation = observations.scatter.run_correlation[s];

@@ -354,6 +354,10 @@ Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sig
   std::normal_distribution<double> normal;
   const Index n = static_cast<Index>(rows_.size());
   const double fresh = std::sqrt(1 - run_correlation * run_correlation);
+  Eigen::VectorXd own = Eigen::VectorXd::Ones(n);  // each run's scatter
+  if (observations_.scatter.runs.size() > 0 && strata_[stratum].means())
+    own = observations_.scatter.runs(rows_) * std::sqrt(static_cast<double>(n)) /
+          observations_.scatter.runs(rows_).norm();
   Stacked result(n * strata_[stratum].modes, static_cast<Index>(sigma.size()));
   for (Index i = 0; i < result.cols(); ++i) {
     for (Index k = 0; k < result.rows(); ++k) result(k, i) = normal(random);
@@ -364,7 +368,7 @@ Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sig
         for (std::size_t k = 1; k < runs.size() && run_correlation != 0; ++k)
           modes(runs[k], mode) = run_correlation * modes(runs[k - 1], mode) + fresh * modes(runs[k], mode);
         const double offset = session * normal(random);
-        for (const Index run : runs) modes(run, mode) += offset;
+        for (const Index run : runs) modes(run, mode) = own(run) * modes(run, mode) + offset;
       }
     }
     result.col(i) *= sigma[static_cast<std::size_t>(i)];

@@ -37,6 +37,7 @@ Observations Observations::subset(const std::vector<int>& kept) const {
     *matrix = Eigen::MatrixXd((*matrix)(kept, Eigen::all));
   for (Eigen::MatrixXd& course : part.shape) course = Eigen::MatrixXd(course(kept, Eigen::all));
   if (sign.size() > 0) part.sign = Eigen::VectorXd(sign(kept));
+  if (scatter.runs.size() > 0) part.scatter.runs = Eigen::VectorXd(scatter.runs(kept));
   for (Place& place : part.places) place.weight = Eigen::VectorXd(place.weight(kept));
   part.duration_s = Eigen::VectorXd(duration_s(kept));
   for (Covariate& covariate : part.covariates)

@@ -47,6 +47,8 @@ struct RunScatter {
   std::array<double, 2> run_correlation = {0, 0};
   /// Each rotor's own over their geometric mean; empty: alike (rotor_scatter.h).
   Eigen::VectorXd rotors = {};
+  /// n: each run's over that of most; empty: alike (run_scatter.h). For the data that are drawn only.
+  Eigen::VectorXd runs = {};
 };
 
 /// n runs (rows of a table) by c channels (rotors; 1 for a table).

@@ -2,6 +2,7 @@
 #include "analysis/residual/null_maxima.h"
 #include "analysis/residual/rotor_scatter.h"
 #include "analysis/residual/run_correlation.h"
+#include "analysis/residual/run_scatter.h"
 #include "analysis/residual/search.h"
 
 #include <algorithm>
@@ -77,20 +78,22 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
   // While a rotor that scatters more was taken for one like the others, the best curve had a part of its
   // scatter.
   const Components residual = rest_beside(curves, known ? critical_ : 0);
-  std::mt19937_64 random(settings_.seed * 1000003 + 3000), other(settings_.seed * 1000003 + 4000);
+  std::mt19937_64 random(settings_.seed * 1000003 + 3000), other(settings_.seed * 1000003 + 4000),
+      third(settings_.seed * 1000003 + 5000);
   RunScatter scatter{.rotors = rotor_scatter(observations_, rows_, residual, other)};
-  const auto correlation_in = [&](const MixedModel& model, const NullFit& variances) {
-    return run_correlation(model, variances, residual, random);
+  const auto set_runs = [&](const MixedModel& model, const NullFit& variances) {
+    scatter.run_correlation = run_correlation(model, variances, residual, random);
+    scatter.runs = run_scatter(observations_, model, variances, residual, third);
   };
   if (known || scatter.rotors.size() > 0) {
     Observations scattered = observations_;
     scattered.scatter = scatter;
     const MixedModel model(scattered, rows_);
-    scatter.run_correlation = correlation_in(model, CandidateScan(model, {}, {}).null_fit(residual));
+    set_runs(model, CandidateScan(model, {}, {}).null_fit(residual));
   } else {
-    scatter.run_correlation = correlation_in(*mixed_, fit_.variances);
+    set_runs(*mixed_, fit_.variances);
   }
-  if (are_alike(scatter.rotors, before.rotors) &&
+  if (are_alike(scatter.rotors, before.rotors) && (before.runs.size() > 0) == (scatter.runs.size() > 0) &&
       (known || scatter.run_correlation == before.run_correlation))
     return false;
   observations_.scatter = std::move(scatter);

@@ -134,6 +134,41 @@ TEST_F(Scatter, AGrossRunIsSuspectAndNamesNothing) {
   }
 }
 
+TEST_F(Scatter, OfOneLocationIsFoundAndSaidAndIsNoStructure) {
+  constexpr int kCampaigns = 12;
+  int said = 0, structure = 0, alike_differ = 0;
+  for (int i = 0; i < kCampaigns; ++i) {
+    Observations o = test::simulate({.runs_of_block = std::vector<int>(16, 8),
+                                     .groups = 8,
+                                     .channels = 4,
+                                     .sigma = kRunSigma,
+                                     .session_ratio = 0.4},
+                                    random);
+    test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
+    const auto warned = [](const Explanation& e) {
+      return std::any_of(e.warnings.begin(), e.warnings.end(), [](const std::string& warning) {
+        return warning.find("scatter more than most") != warning.npos;
+      });
+    };
+    alike_differ += warned(explained(o)) ? 1 : 0;
+    std::normal_distribution<double> normal(0, 8 * kRunSigma);
+    MatrixXd y = o.y;
+    for (Index row = 0; row < y.rows(); ++row)
+      for (Index c = 0; c < 4 && o.group[static_cast<std::size_t>(row)] == 3; ++c)
+        y(row, c) += normal(random);
+    test::set_y(o, y);
+    const Explanation e = explained(o);
+    if (warned(e)) {
+      ++said;
+      EXPECT_THAT(e.warnings, testing::Contains(testing::HasSubstr(" at " + o.group_name[3] + " scatter")));
+    }
+    structure += e.verdict == "no_structure" ? 0 : 1;
+  }
+  EXPECT_LE(alike_differ, 1);
+  EXPECT_GE(said, kCampaigns - 1);
+  EXPECT_LE(structure, 2);
+}
+
 /// Each makes the variance that the others are held against.
 TEST_F(Scatter, SeveralGrossRunsDoNotHideEachOther) {
   Observations o = observations();

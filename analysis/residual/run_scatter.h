@@ -1,0 +1,19 @@
+// Whether runs of some locations or sessions scatter more than others: near a wall, in a draught.
+#pragma once
+
+#include "analysis/residual/likelihood.h"
+
+#include <random>
+
+namespace tunnelrig {
+
+/// n: of each run its scatter over that of most, where the runs of a group or block scatter more than twice
+/// as much and beyond all of 200 data sets whose runs are alike; elsewhere 1. Runs that the model does not
+/// hold are like the others of their group. Empty: all are alike, and for tables, whose groups are no repeats
+/// of each other.
+///
+/// `residual`: what the model leaves.
+Eigen::VectorXd run_scatter(const Observations& observations, const MixedModel& model,
+                            const NullFit& variances, const Components& residual, std::mt19937_64& random);
+
+}  // namespace tunnelrig
