@@ -14,7 +14,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kAlikeSets = 200;
-constexpr double kUnlike = 2;       // less makes no structure
+constexpr double kUnlike = 2;  // less makes no structure
+constexpr double kLeastLeft = 1e-3;
 constexpr std::size_t kFewest = 3;  // of two, nothing says which of them scatters
 
 /// Mean size of what is left of each run, over its standard deviation, of the means' strata; a column for
@@ -100,7 +101,9 @@ void let_differ(const std::vector<int>& number, const std::vector<int>& rows, co
   std::map<int, std::vector<Index>> by_number;
   for (std::size_t k = 0; k < rows.size(); ++k)
     by_number[number[static_cast<std::size_t>(rows[k])]].push_back(static_cast<Index>(k));
-  std::erase_if(by_number, [](const auto& set) { return set.second.size() < 2; });
+  // Nothing is left of the only run at a location, nor of a session of such.
+  std::erase_if(by_number,
+                [&](const auto& set) { return alike(set.second, Eigen::all).mean() < kLeastLeft; });
   if (by_number.size() < kFewest) return;
   std::vector<std::vector<Index>> sets;
   for (const auto& [of, runs] : by_number) sets.push_back(runs);
