@@ -31,7 +31,7 @@ class EventStream {
   /// The data of the next event `name` that `wanted` agrees to; nothing where none came within `patience`.
   std::optional<std::string> next(const std::string& name,
                                   const std::function<bool(const std::string&)>& wanted = {},
-                                  std::chrono::milliseconds patience = std::chrono::seconds(20));
+                                  std::chrono::milliseconds patience = std::chrono::seconds(90));
 
  private:
   int socket_;
