@@ -55,7 +55,7 @@ void finish_group(TableReduction& reduction, TableGroup& group) {
   group.median = median_of(c_t);
   for (const std::size_t row : group.rows) {
     const double ratio = reduction.rows[row].c_t / group.median;
-    if (ratio > kDoubtful || ratio < 1 / kDoubtful) reduction.doubtful.push_back(reduction.rows[row].line);
+    if (ratio > kDoubtful || ratio < 1 / kDoubtful) reduction.doubtful.push_back(reduction.rows[row].place);
   }
   for (double& value : c_t) value = std::abs(value - group.median);
   group.spread = 1.4826 * median_of(c_t);
@@ -132,7 +132,7 @@ TableReduction reduce_table_rows(const ObservationTable& table, Convention conve
     const auto [found, fresh] = groups.emplace(row.group, reduction.groups.size());
     if (fresh) reduction.groups.push_back({.name = row.group, .rows = {}});
     reduction.groups[found->second].rows.push_back(reduction.rows.size());
-    reduction.rows.push_back({i, row.group, row.speed_rpm.value_or(0), *c_t, row.line});
+    reduction.rows.push_back({i, row.group, row.speed_rpm.value_or(0), *c_t, row.place});
   }
   if (reduction.rows.empty()) {
     throw InputError::in(table.schema.file,
@@ -144,9 +144,9 @@ TableReduction reduce_table_rows(const ObservationTable& table, Convention conve
 }
 
 std::string observations_csv(const TableReduction& reduction) {
-  Sheet sheet{.file = "", .columns = {"group", "line", "speed_rpm", "c_t", "convention"}, .rows = {}};
+  Sheet sheet{.file = "", .columns = {"group", "row", "speed_rpm", "c_t", "convention"}, .rows = {}};
   for (const TableRow& row : reduction.rows) {
-    sheet.rows.push_back({{row.group, fmt::format("{}", row.line), fmt::format("{:.6g}", row.speed_rpm),
+    sheet.rows.push_back({{row.group, row.place, fmt::format("{:.6g}", row.speed_rpm),
                            fmt::format("{:.8g}", row.c_t), std::string(name_of(reduction.convention))},
                           0});
   }
@@ -159,7 +159,7 @@ std::string table_reduction_json(const TableReduction& reduction) {
                               {"convention", name_of(reduction.convention)},
                               {"observations", reduction.rows.size()},
                               {"left_out", {{"at_rest", reduction.at_rest}, {"unknown", reduction.unknown}}},
-                              {"doubtful_lines", reduction.doubtful}};
+                              {"doubtful_rows", reduction.doubtful}};
   for (const TableGroup& group : reduction.groups) {
     nlohmann::ordered_json one{
         {"group", group.name}, {"c_t_median", group.median}, {"c_t_spread", group.spread}};

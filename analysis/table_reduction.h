@@ -16,7 +16,7 @@ struct TableRow {
   std::string group;
   double speed_rpm = 0;
   double c_t = 0;
-  int line = 0;
+  std::string place;  // file and line
 };
 
 struct TableGroup {
@@ -35,7 +35,8 @@ struct TableReduction {
   std::vector<TableGroup> groups;  // in the order of the table
   std::size_t unknown = 0;         // rows left out because their speed or diameter is not known
   std::size_t at_rest = 0;         // rows left out because the motor stood, or its tachometer had not locked
-  std::vector<int> doubtful;       // lines whose C_T is more than three times off their group's median
+  /// File and line of rows whose C_T is more than three times off their group's median.
+  std::vector<std::string> doubtful;
 };
 
 /// C_T of every row: from its thrust, speed, diameter and air, or converted from the coefficient that the

@@ -105,6 +105,10 @@ int import_rows(const ImportVerbOptions& options) {
   const TableParts parts = check_table(table);
   store_table(table, options.db, options.replace);
   print_rows(options, table, parts);
+  if (options.format == "rcbenchmark" && !table.schema.speed_column)
+    warn(
+        "no column Motor Optical Speed or Motor Electrical Speed has a value: thrust without speed gives no "
+        "C_T");
   return kWell;
 }
 

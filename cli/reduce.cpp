@@ -152,7 +152,7 @@ int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
   }
   if (!reduction.doubtful.empty()) {
     warn(
-        fmt::format("{} rows have a C_T more than three times off their group's median; first in line {}: is "
+        fmt::format("{} rows have a C_T more than three times off their group's median; the first is {}: is "
                     "the speed right?",
                     reduction.doubtful.size(), reduction.doubtful.front()));
   }

@@ -135,6 +135,8 @@ UsbStream::~UsbStream() {
   // Transfers that the system does not give back are left to it, with the bus they are on; freeing them would
   // be worse.
   static std::mutex mutex;
+  // Without memory for a list the program may as well end:
+  // NOLINTNEXTLINE(bugprone-unhandled-exception-at-new)
   static auto* const left_behind = new std::vector<std::shared_ptr<State>>;  // not even at the exit
   const std::lock_guard lock(mutex);
   left_behind->push_back(state_);

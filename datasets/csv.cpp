@@ -103,19 +103,6 @@ void check_encoding(std::string_view text, const std::string& file) {
   }
 }
 
-/// "" where commas separate the header's cells, as they must; else what to do about it.
-std::string_view separator_advice(const std::vector<std::string>& columns) {
-  const auto count = [&](char separator) {
-    std::size_t found = 0;
-    for (const std::string& column : columns)
-      found += static_cast<std::size_t>(std::count(column.begin(), column.end(), separator));
-    return found;
-  };
-  if (count(';') >= columns.size()) return "; the header looks separated by semicolons: commas are needed";
-  if (count('\t') >= columns.size()) return "; the header looks separated by tabs: commas are needed";
-  return "";
-}
-
 void check_header(const Sheet& sheet) {
   for (std::size_t i = 0; i < sheet.columns.size(); ++i) {
     if (std::find(sheet.columns.begin(), sheet.columns.begin() + static_cast<std::ptrdiff_t>(i),
@@ -143,6 +130,18 @@ std::optional<std::size_t> Sheet::find(std::string_view column) const {
   return static_cast<std::size_t>(found - columns.begin());
 }
 
+std::string_view separator_advice(const std::vector<std::string>& columns) {
+  const auto count = [&](char separator) {
+    std::size_t found = 0;
+    for (const std::string& column : columns)
+      found += static_cast<std::size_t>(std::count(column.begin(), column.end(), separator));
+    return found;
+  };
+  if (count(';') >= columns.size()) return "; the header looks separated by semicolons: commas are needed";
+  if (count('\t') >= columns.size()) return "; the header looks separated by tabs: commas are needed";
+  return "";
+}
+
 std::size_t Sheet::require(std::string_view column) const {
   if (const auto found = find(column)) return *found;
   throw InputError::at(file, 1, "the required column {} is missing{}", column, separator_advice(columns));
@@ -161,8 +160,12 @@ const std::string& Sheet::text(std::size_t row, std::string_view column) const {
   return index ? rows[row].cells[*index] : empty;
 }
 
+std::string Sheet::place(std::size_t row) const {
+  return fmt::format("{}:{}", rows[row].file.empty() ? file : rows[row].file, rows[row].line);
+}
+
 std::string Sheet::where(std::size_t row, std::string_view column) const {
-  return fmt::format("{}:{}: column {}", file, rows[row].line, column);
+  return fmt::format("{}: column {}", place(row), column);
 }
 
 std::optional<double> Sheet::number(std::size_t row, std::string_view column) const {

@@ -15,6 +15,7 @@ struct Sheet {
   struct Row {
     std::vector<std::string> cells;  // one per column
     int line = 0;                    // 1-based line of the file that the row starts on
+    std::string file = {};           // where that is another than the sheet's: files that were stacked
   };
 
   std::string file;  // as messages name it
@@ -42,9 +43,15 @@ struct Sheet {
   /// As `require_number`, for whole numbers from `lowest` to `highest`.
   int require_integer(std::size_t row, std::string_view column, int lowest, int highest) const;
 
+  /// "runs.csv:12", for messages.
+  std::string place(std::size_t row) const;
+
   /// "runs.csv:12: column speed_rpm", for messages.
   std::string where(std::size_t row, std::string_view column) const;
 };
+
+/// "" where commas separate the header's cells, as they must; else what to do about it, for messages.
+std::string_view separator_advice(const std::vector<std::string>& columns);
 
 /// Parses CSV text. Throws InputError for a missing header, a column named twice or not at all, a row of
 /// the wrong length, an unclosed quote, or text that is not UTF-8.

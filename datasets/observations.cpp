@@ -24,7 +24,7 @@ std::optional<double> converted(const Sheet& sheet, std::size_t row, const Table
 }
 
 Observation read_row(const Sheet& sheet, std::size_t row, const TableSchema& schema) {
-  Observation observation{.line = sheet.rows[row].line,
+  Observation observation{.place = sheet.place(row),
                           .group = {},
                           .air_temperature_C = schema.air_temperature_C,
                           .air_pressure_Pa = schema.air_pressure_Pa};
@@ -51,22 +51,35 @@ Observation read_row(const Sheet& sheet, std::size_t row, const TableSchema& sch
   return observation;
 }
 
-/// Lines of the CSV where they do not simply follow: blank ones, or cells of several lines. Stacked files
-/// have lines of their own, and are counted as one.
-void store_lines(const Sheet& sheet, CampaignFile& file) {
+/// Lines of the CSV where they do not simply follow: blank ones, cells of several lines, stacked files. And
+/// of stacked files, which rows are whose: [[name, how many], …].
+void store_places(const Sheet& sheet, CampaignFile& file) {
   std::vector<int> lines;
-  for (const Sheet::Row& row : sheet.rows) lines.push_back(row.line);
-  const bool one_file = std::adjacent_find(lines.begin(), lines.end(), std::greater_equal()) == lines.end();
-  if (one_file && lines.back() != static_cast<int>(lines.size()) + 1)
-    file.set_text("table.lines", nlohmann::json(lines).dump());
+  std::vector<std::pair<std::string, std::size_t>> files;
+  bool follow = true;
+  for (const Sheet::Row& row : sheet.rows) {
+    lines.push_back(row.line);
+    follow = follow && row.line == static_cast<int>(lines.size()) + 1;
+    if (files.empty() || files.back().first != row.file) files.emplace_back(row.file, 0);
+    ++files.back().second;
+  }
+  if (!follow) file.set_text("table.lines", nlohmann::json(lines).dump());
+  if (files.size() > 1 || !files.front().first.empty())
+    file.set_text("table.files", nlohmann::json(files).dump());
 }
 
-void restore_lines(const CampaignFile& file, Sheet& sheet) {
-  const auto text = file.text("table.lines");
-  if (!text) return;
-  const auto lines = nlohmann::json::parse(*text).get<std::vector<int>>();
-  for (std::size_t row = 0; row < std::min(lines.size(), sheet.rows.size()); ++row)
-    sheet.rows[row].line = lines[row];
+void restore_places(const CampaignFile& file, Sheet& sheet) {
+  if (const auto text = file.text("table.lines")) {
+    const auto lines = nlohmann::json::parse(*text).get<std::vector<int>>();
+    for (std::size_t row = 0; row < std::min(lines.size(), sheet.rows.size()); ++row)
+      sheet.rows[row].line = lines[row];
+  }
+  if (const auto text = file.text("table.files")) {
+    std::size_t row = 0;
+    for (const auto& [name, count] :
+         nlohmann::json::parse(*text).get<std::vector<std::pair<std::string, std::size_t>>>())
+      for (std::size_t i = 0; i < count && row < sheet.rows.size(); ++i) sheet.rows[row++].file = name;
+  }
 }
 
 }  // namespace
@@ -93,7 +106,7 @@ ObservationTable observations_of(const CampaignFile& file) {
   auto sheet = file.sheet("observations");
   if (!toml || !sheet) throw InputError::in(file.path().string(), "holds no table of observations");
   if (const auto source = file.text("table.source")) sheet->file = *source;
-  restore_lines(file, *sheet);
+  restore_places(file, *sheet);
   return read_observations(*sheet,
                            parse_table_schema(*toml, file.text("table.schema").value_or("table.toml")));
 }
@@ -107,7 +120,7 @@ void store_table(const ObservationTable& table, const std::filesystem::path& fil
   staged.file().set_text("table.schema", name_of(table.schema.file));
   staged.file().set_text("table.source", name_of(table.sheet.file));
   staged.file().set_sheet("observations", table.sheet);
-  store_lines(table.sheet, staged.file());
+  store_places(table.sheet, staged.file());
   staged.publish();
 }
 

@@ -57,7 +57,7 @@ TableSchema parse_table_schema(const std::string& text, const std::string& file)
 
 /// One row, in SI (speeds in rev/min, temperatures in °C).
 struct Observation {
-  int line = 0;  // of the CSV
+  std::string place;  // file and line of the CSV, for messages
   std::string group;
   double response = 0;
   std::optional<double> speed_rpm;

@@ -29,9 +29,11 @@ std::optional<std::size_t> sweep_row(const Sheet& sweeps, const std::string& fil
 
 void append_sweep(Sheet& all, const Sheet& sweep, const Sheet& sweeps, const std::string& file) {
   const auto known = sweep_row(sweeps, file);
+  if (const auto advice = separator_advice(sweep.columns); !advice.empty())
+    throw InputError::at(sweep.file, 1, "its columns cannot be told apart{}", advice);
   if (!sweeps.columns.empty() && !known) throw InputError::in(sweeps.file, "has no row for {}", file);
   for (const Sheet::Row& row : sweep.rows) {
-    all.rows.push_back({std::vector<std::string>(all.columns.size()), row.line});
+    all.rows.push_back({std::vector<std::string>(all.columns.size()), row.line, file});
     const auto put = [&all](const std::string& column, const std::string& text) {
       if (column.empty()) return;
       const std::size_t index = all.ensure(column);
@@ -72,14 +74,17 @@ std::string sweep_schema(const Sheet& all, const SweepOptions& options, const st
     throw InputError::in(source, "no column Thrust (unit) with a value; is this an RCbenchmark sweep?");
   auto speed = column_starting(all, "Motor Optical Speed");
   if (!speed) speed = column_starting(all, "Motor Electrical Speed");
-  if (!speed)
-    throw InputError::in(source, "no column Motor Optical Speed or Motor Electrical Speed with a value");
   const std::string group = all.find("group") ? "group" : "file";
   std::string toml = fmt::format("format = \"{}\"\nname = \"{}\"\ngroups = [\"{}\"]\nblocks = \"file\"\n",
                                  kTableFormat, std::filesystem::path(source).filename().string(), group);
   toml += column_toml("[response]", *thrust, "thrust_N");
-  toml += column_toml("[speed]", *speed, "");
-  if (options.pole_count) toml += fmt::format("electrical = true\npole_count = {}\n", *options.pole_count);
+  if (speed) {
+    toml += column_toml("[speed]", *speed, "");
+    if (options.pole_count) toml += fmt::format("electrical = true\npole_count = {}\n", *options.pole_count);
+  } else if (options.pole_count) {
+    throw InputError::in(source,
+                         "--pole-count: no column Motor Optical Speed or Motor Electrical Speed has a value");
+  }
   if (all.find("propeller_diameter_m")) {
     toml += "\n[propeller]\ndiameter_column = \"propeller_diameter_m\"\ndiameter_unit = \"m\"\n";
   } else if (options.propeller_diameter_m) {

@@ -24,7 +24,8 @@ struct Sample {
   std::span<const double> reference;  // their typical values in the campaign (medians; kept when adopted)
   double time_s = 0;                  // since the run's first frame
   double previous_N = 0;  // predicted force of the run before, same rotor and session; NaN for the first
-  double other_N = 0;     // predicted force of the rotor that leaks into this one (crosstalk)
+  double previous_error_N = 0;  // standard error of its difference from this run's, as far as it is known
+  double other_N = 0;           // predicted force of the rotor that leaks into this one (crosstalk)
   double newtons_per_volt = 1;  // of the cell; 1 where the campaign gives forces
   const Rig* rig = nullptr;
 };

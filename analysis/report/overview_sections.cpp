@@ -143,7 +143,7 @@ Json table_section(const ObservationTable& table, const TableReduction& reductio
             {"reduced", reduction.rows.size()},
             {"unknown", reduction.unknown},
             {"at_rest", reduction.at_rest},
-            {"doubtful_lines", reduction.doubtful},
+            {"doubtful_rows", reduction.doubtful},
             {"groups", Json::array()}};
   for (const TableGroup& group : reduction.groups) {
     Json columns{{"group", group.name}, {"median", group.median}, {"spread", group.spread}};

@@ -41,6 +41,11 @@ void Search::begin() {
   observations_.scatter = std::move(scatter);
   make_models();
   ways_ = all_ways(effects_, observations_, rows_);
+  // What only another effect's changes of the force would show is no evidence of its own.
+  const Eigen::MatrixXd known = predict_response(observations_, {known_terms(observations_), {}}, rows_);
+  std::erase_if(ways_, [&](const Term& way) {
+    return !mixed_->sees(respond(way, observations_, known).derivative[0]);
+  });
   points_.clear();
   for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
   result_ = {};

@@ -26,9 +26,9 @@ struct SearchSettings {
 /// One line of a ranking.
 struct Ranked {
   Term term;
-  double evidence = 0;  // −log10 p of its own
-  double p = 1;         // by the maximum over all candidates
-  double amplitude = 0, standard_error = 0;
+  double evidence = 0;                       // −log10 p of its own
+  double p = 1;                              // by the maximum over all candidates
+  double amplitude = 0, standard_error = 0;  // mean and 0 where each group has its own
 };
 
 /// What one round of the search saw.
@@ -43,8 +43,7 @@ struct Round {
 struct Accepted {
   Term term;
   double p = 1;
-  double gain = 0;  // fall of the leave-one-block-out error, response's unit
-  double loss_gain = 0, loss_standard_error = 0;
+  double gain = 0;                 // fall of the leave-one-block-out error, response's unit
   std::vector<Ranked> confounded;  // one way of each effect that does as well
 };
 

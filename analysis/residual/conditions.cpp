@@ -27,7 +27,7 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
   std::map<std::string, std::vector<Untestable>> by_name;
   std::set<std::string> testable;
   const MixedModel mixed = MixedModel::baseline_alone(observations, rows);
-  const MatrixXd predicted = predict_response(observations, {}, rows);
+  const MatrixXd predicted = predict_response(observations, {known_terms(observations), {}}, rows);
   for (const Effect* effect : effects) {
     const Testability can = testability(*effect, observations);
     std::string reason = can.reason;
@@ -38,7 +38,9 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
         return mixed.sees(respond(way, observations, predicted).derivative[0]);
       });
       if (!seen && reason.empty())
-        reason = "it does not vary within any location, so the location's coefficient absorbs it";
+        reason = observations.from_table
+                     ? "it does not vary within any group beside the baseline, which absorbs it"
+                     : "it does not vary within any location, so the location's coefficient absorbs it";
       if (seen) {
         testable.insert(effect->name);
         continue;
@@ -172,7 +174,7 @@ std::vector<std::string> that_scatter(const Eigen::VectorXd& scatter, const std:
   return result;
 }
 
-/// "runs at H2V0, H3V-1 scatter up to 8.3 times more than most"
+/// "runs at H2V0, H3V-1 scatter more than most, up to 8.3 times"
 std::string wilder_runs(const Observations& observations) {
   const Eigen::VectorXd& scatter = observations.scatter.runs;
   std::vector<std::string> names = that_scatter(scatter, observations.group, observations.group_name);

@@ -88,35 +88,17 @@ MatrixXd straight_over(const Curve& curve) {
   return straight;
 }
 
-/// Whether the place differs between `rows`, and not as one before it does.
-bool tells_rows_apart(const std::vector<Place>& places, std::size_t i, const std::vector<int>& rows) {
-  const Eigen::VectorXd weight = places[i].weight(rows);
-  if (!(weight.maxCoeff() > weight.minCoeff())) return false;
-  return std::none_of(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(i),
-                      [&](const Place& before) { return before.weight(rows).isApprox(weight); });
-}
-
-/// Slopes over a condition that go with the place.
-void add_slopes_by_place(const Observations& observations, const Covariate& covariate,
-                         const std::vector<int>& rotors, const std::vector<int>& rows,
-                         std::vector<Curve>& curves) {
-  const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff();
-  const CurveShape shape =
-      is_ratio(observations, covariate) ? CurveShape::kLogStraight : CurveShape::kStraight;
-  const auto straight = [&](int k, double x) { return curve_column(shape, k, x, low, high); };
-  for (std::size_t i = 0; i < observations.places.size(); ++i) {
-    if (!tells_rows_apart(observations.places, i, rows)) continue;
-    for (const int rotor : rotors) {
-      curves.push_back({.covariate = covariate.name,
-                        .rotor = rotor,
-                        .shape = shape,
-                        .columns = columns_over(observations, covariate, rotor, 1, straight),
-                        .x = covariate.value,
-                        .place = observations.places[i]});
-      MatrixXd& column = curves.back().columns[0][0];
-      column = observations.places[i].weight.asDiagonal() * column;
-    }
+/// Those that differ between `rows`, and not as one before does.
+std::vector<Place> places_to_try(const Observations& observations, const std::vector<int>& rows) {
+  std::vector<Place> result;
+  for (const Place& place : observations.places) {
+    const Eigen::VectorXd weight = place.weight(rows);
+    if (weight.maxCoeff() > weight.minCoeff() &&
+        std::none_of(result.begin(), result.end(),
+                     [&](const Place& before) { return before.weight(rows).isApprox(weight); }))
+      result.push_back(place);
   }
+  return result;
 }
 
 /// Whether another condition of the runs goes with it: sessions that all begin at one hour.
@@ -132,7 +114,7 @@ bool repeats_another(const Observations& observations, const Covariate& covariat
 }  // namespace
 
 std::string Curve::label() const {
-  return covariate + (place.name.empty() ? "" : " × " + place.name) +
+  return covariate + (everywhere() ? "" : " × " + place.name) +
          (rotor < 0 ? "" : fmt::format(" of rotor {}", rotor + 1));
 }
 
@@ -185,6 +167,7 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
   for (int rotor = 0; rotor < static_cast<int>(observations.channels()) && observations.channels() > 1;
        ++rotor)
     rotors.push_back(rotor);
+  const std::vector<Place> places = places_to_try(observations, rows);
   std::vector<Curve> curves;
   for (const Covariate& covariate : observations.covariates) {
     if (observations.not_usable.contains(covariate.name) || covariate.value.array().isNaN().any()) continue;
@@ -206,16 +189,21 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
       continue;
     const int most = different_values(covariate, rows) / 3;
     const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff();
-    const auto add = [&](CurveShape shape, int count) {
+    const auto add = [&](CurveShape shape, int count, const Place& place = {}) {
       const auto column_at = [&](int k, double x) { return curve_column(shape, k, x, low, high); };
-      for (const int rotor : rotors)
+      for (const int rotor : rotors) {
         curves.push_back({.covariate = covariate.name,
                           .rotor = rotor,
                           .shape = shape,
                           .columns = columns_over(observations, covariate, rotor, count, column_at),
-                          .x = covariate.value});
+                          .x = covariate.value,
+                          .place = place});
+        if (curves.back().everywhere()) continue;
+        for (Components& column : curves.back().columns) column[0] = place.weight.asDiagonal() * column[0];
+      }
     };
-    add_slopes_by_place(observations, covariate, rotors, rows, curves);
+    for (const Place& place : places)
+      add(is_ratio(observations, covariate) ? CurveShape::kLogStraight : CurveShape::kStraight, 1, place);
     if (most >= 1)
       for (const CurveShape bend : bends_over(observations, covariate)) add(bend, 1);
     // Where a whole wave finds no row its height is anything.
@@ -264,7 +252,7 @@ Curve with_trend(const Curve& curve) {
 }
 
 bool is_bend_over(const Curve& curve, const std::vector<std::string>& covariates, int rotor) {
-  return curve.columns.size() == 1 && curve.shape != CurveShape::kLevels && curve.place.name.empty() &&
+  return curve.columns.size() == 1 && curve.shape != CurveShape::kLevels && curve.everywhere() &&
          curve.x.size() > 0 && curve.rotor == rotor && is_over(curve, covariates);
 }
 
@@ -273,7 +261,7 @@ Candidate as_candidate(const Curve& curve) {
   const auto channels = static_cast<double>(curve.columns[0][0].cols());
   return {.columns = curve.columns,
           .sign = 0,
-          .weight = (curve.rotor < 0 ? 1 : 1 / channels) * (curve.place.name.empty() ? 1 : kPlaceWeight)};
+          .weight = (curve.rotor < 0 ? 1 : 1 / channels) * (curve.everywhere() ? 1 : kPlaceWeight)};
 }
 
 }  // namespace tunnelrig

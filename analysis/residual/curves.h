@@ -24,6 +24,7 @@ struct Curve {
   Place place = {};                      // what it is drawn for is a weight of 1
 
   std::string label() const;
+  bool everywhere() const { return place.name.empty(); }
   /// Whether it is over the same, of the same rotor and in the same places.
   bool is_like(const Curve& other) const;
 };

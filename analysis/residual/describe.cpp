@@ -49,6 +49,37 @@ std::vector<Drawn> drawn_curve(const Curve& curve, double low, double high) {
   return points;
 }
 
+/// What is straight over a condition along which each group has a line (or a power law) of its own is that
+/// line's, of which the fit gives the curve a part or not: it is taken out of what is drawn.
+void take_out_baseline(const Observations& observations, const std::vector<int>& rows, const Curve& curve,
+                       double low, double high, std::vector<Drawn>& points) {
+  if (observations.slopes.cols() == 0 || curve.x.cols() != 1) return;
+  const auto n = static_cast<Index>(rows.size()), k = static_cast<Index>(curve.columns.size());
+  for (const CurveShape shape : {CurveShape::kStraight, CurveShape::kLogStraight}) {
+    if (is_of_logarithm(shape) && low <= 0) return;
+    const auto straight = [&](double x) { return Eigen::Vector2d(1, curve_straight(shape, x, low, high)); };
+    Eigen::MatrixX2d line(n, 2);
+    MatrixXd columns(n, k);
+    MatrixXd slopes(n, observations.slopes.cols());
+    for (Index r = 0; r < n; ++r) {
+      const int row = rows[static_cast<std::size_t>(r)];
+      const double x = curve.x(row, 0);
+      line.row(r) = straight(x).transpose();
+      slopes.row(r) = observations.slopes.row(row);
+      for (Index b = 0; b < k; ++b)
+        columns(r, b) = tilted_column(curve.shape, curve.tilt, static_cast<std::size_t>(b), x, low, high);
+    }
+    const auto solver = line.colPivHouseholderQr();
+    const MatrixXd bent = slopes - line * solver.solve(slopes);
+    const MatrixXd centred = slopes.rowwise() - slopes.colwise().mean();
+    if ((bent.colwise().norm().array() > 1e-6 * centred.colwise().norm().array()).all())
+      continue;  // the groups' lines are over something else
+    const MatrixXd taken = solver.solve(columns);
+    for (Drawn& point : points) point.columns -= taken.transpose() * straight(point.x);
+    return;
+  }
+}
+
 /// The column of the runs sheet that a condition is made of: its own name where it is made of raw data or of
 /// the order.
 std::string column_behind(const std::string& derived) {
@@ -89,8 +120,10 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   const bool within = found.curve.x.size() == 0;
   const double low = within ? 0 : found.curve.x.minCoeff();
   const double high = within ? observations.duration_s.maxCoeff() : found.curve.x.maxCoeff();
+  std::vector<Drawn> points = result.levels ? drawn_levels(found.curve) : drawn_curve(found.curve, low, high);
+  if (!result.levels) take_out_baseline(observations, rows, found.curve, low, high, points);
   double mean = 0;
-  for (const Drawn& point : result.levels ? drawn_levels(found.curve) : drawn_curve(found.curve, low, high)) {
+  for (const Drawn& point : points) {
     const double value = scale * point.columns.dot(amplitude),
                  half =
                      1.96 * scale * std::sqrt(std::max(0.0, point.columns.dot(covariance * point.columns)));

@@ -155,9 +155,11 @@ void warn_of_doubts(Explanation& explanation) {
   constexpr double kFarAboveFloor = 1.25;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     const ParameterEstimate& amplitude = adopted.parameters[0];
-    if (amplitude.low <= 0 && amplitude.high >= 0)
-      explanation.warnings.push_back(fmt::format("{}: the 95 % interval of its {} holds 0: doubt it",
-                                                 adopted.term.label(), amplitude.name));
+    const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
+    // Where groups have their own, these may be of either sign, and nothing on the whole.
+    if (adopted.term.per_group ? std::ranges::all_of(amplitude.groups, holds_0) : holds_0(amplitude))
+      explanation.warnings.emplace_back(fmt::format("{}: the 95 % interval of its {} holds 0: doubt it",
+                                                    adopted.term.label(), amplitude.name));
   }
   if (!explanation.adopted.empty() && explanation.after.held_out_rmse > explanation.before.held_out_rmse)
     explanation.warnings.push_back(
@@ -191,7 +193,9 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
                           .model = {}};
   explanation.warnings = observations.left_out;
   for (const auto& [covariate, why] : observations.not_usable)
-    explanation.warnings.push_back(fmt::format("{} is {}", covariate, why));
+    explanation.warnings.push_back(
+        fmt::format("{} is {}{}", covariate, why,
+                    why.starts_with("missing") ? ": what goes with it cannot be seen" : ""));
   const std::vector<int> rows = observations.all_rows();
   if (observations.blocks() < kFewestBlocks) {
     report_untestable(observations, effects, rows, explanation);

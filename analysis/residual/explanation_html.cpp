@@ -209,7 +209,7 @@ class Page {
             shape(row, c) = unknown.levels
                                 ? at_level(unknown.shape, curve.x(row, 0), curve.levels[0])
                                 : interpolated(unknown.shape, curve.x(row, curve.x.cols() > 1 ? c : 0));
-      if (curve.place.weight.size() > 0) shape = curve.place.weight.asDiagonal() * shape;
+      if (!curve.everywhere()) shape = curve.place.weight.asDiagonal() * shape;
       list.push_back(panel("unknown: " + curve.label(), curve.covariate, curve.x, curve.rotor, visible(shape),
                            curve.place));
       return;

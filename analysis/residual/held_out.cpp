@@ -47,24 +47,31 @@ Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vect
   return fit;
 }
 
-/// Where whole groups are held out, a group's constant is the mean over every other run of it; the rest is
-/// scored. `residual` came with NaN there because the model has no such group: `plain` is the same without
-/// any baseline.
-void own_constants(const Observations& observations, const std::vector<int>& rows, const MatrixXd& plain,
-                   double sigma2, MatrixXd& residual, MatrixXd& variance) {
+/// Where whole groups are held out, a group's constant and slopes are fitted to every other run of it; the
+/// rest is scored, if there are as many runs as coefficients. `residual` came with NaN there because the
+/// model has no such group: `plain` is the same without any baseline.
+void own_baseline(const Observations& observations, const std::vector<int>& rows, const MatrixXd& plain,
+                  double sigma2, MatrixXd& residual, MatrixXd& variance) {
   std::map<int, std::vector<Index>> runs;
   for (std::size_t r = 0; r < rows.size(); ++r)
     if (std::isnan(residual(static_cast<Index>(r), 0)))
       runs[observations.group[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
   for (const auto& [group, members] : runs) {
-    Eigen::RowVectorXd constant = Eigen::RowVectorXd::Zero(plain.cols());
-    const std::size_t halves = (members.size() + 1) / 2;
-    const double used = static_cast<double>(halves);
-    for (std::size_t m = 0; m < members.size(); m += 2) constant += plain.row(members[m]) / used;
-    for (std::size_t m = 1; m < members.size(); m += 2) {
-      residual.row(members[m]) = plain.row(members[m]) - constant;
-      variance.row(members[m]).setConstant(sigma2 * (1 + 1 / used));
-    }
+    std::vector<Index> fitted, scored;
+    for (std::size_t m = 0; m < members.size(); ++m) (m % 2 == 0 ? fitted : scored).push_back(members[m]);
+    const auto design = [&](const std::vector<Index>& of) {
+      MatrixXd x(static_cast<Index>(of.size()), 1 + observations.slopes.cols());
+      for (std::size_t m = 0; m < of.size(); ++m)
+        x.row(static_cast<Index>(m)) << 1, observations.slopes.row(rows[static_cast<std::size_t>(of[m])]);
+      return x;
+    };
+    const MatrixXd x = design(fitted), wanted = design(scored);
+    if (x.rows() < x.cols()) continue;
+    const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(x);
+    const MatrixXd weights = wanted * solver.pseudoInverse();  // of the fitted runs, in each prediction
+    residual(scored, Eigen::all) = plain(scored, Eigen::all) - weights * plain(fitted, Eigen::all);
+    for (std::size_t m = 0; m < scored.size(); ++m)
+      variance.row(scored[m]).setConstant(sigma2 * (1 + weights.row(static_cast<Index>(m)).squaredNorm()));
   }
 }
 
@@ -139,8 +146,8 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     MatrixXd errors = Eigen::Map<const MatrixXd>(residual.data(), n, stratum.modes);
     MatrixXd variances = Eigen::Map<const MatrixXd>(variance.data(), n, stratum.modes);
     if (stratum.means() && observations.groups_within_blocks)
-      own_constants(observations, test_rows, Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes),
-                    sigma2, errors, variances);
+      own_baseline(observations, test_rows, Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes),
+                   sigma2, errors, variances);
     parts.push_back(whitened(observations, test_rows, errors, null.sigma[s], kRatios[null.ratio[s]],
                              model.run_correlation(s)));
     if (!stratum.means()) continue;

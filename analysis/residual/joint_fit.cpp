@@ -200,9 +200,12 @@ MatrixXd predict_response(const Observations& observations, const MeanModel& mod
   for (int pass = 0; pass < 2; ++pass) {
     MatrixXd residual = observations.y;
     MatrixXd added = MatrixXd::Zero(residual.rows(), residual.cols());
-    if (pass > 0)
-      for (const Term& term : model.terms) added += respond(term, observations, predicted).value[0];
-    residual -= added;
+    for (const Term& term : model.terms) {
+      if (pass == 0) break;
+      const MatrixXd value = respond(term, observations, predicted).value[0];
+      residual -= value;
+      if (!term.effect->needs_previous) added += value;
+    }
     MatrixXd sum = MatrixXd::Zero(observations.groups(), residual.cols());
     VectorXd count = VectorXd::Zero(observations.groups());
     for (const int row : rows) {

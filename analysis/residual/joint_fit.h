@@ -23,7 +23,8 @@ struct LinearModel {
 };
 
 /// Force (response) that baseline and terms predict, n × c: group constants and slopes fitted to `rows`; with
-/// a linear baseline without its zero, which is no force.
+/// a linear baseline without its zero, which is no force. Effects of the run before are in what is fitted but
+/// not in the forces: it is loads that a cell remembers, not what it made of them.
 Eigen::MatrixXd predict_response(const Observations& observations, const MeanModel& model,
                                  const std::vector<int>& rows);
 

@@ -97,7 +97,7 @@ class Root {
 }  // namespace
 
 void whiten(const std::vector<std::vector<Index>>& blocks, double session_ratio, double run_correlation,
-            Eigen::Ref<MatrixXd> columns) {
+            Eigen::Ref<MatrixXd> columns) {  // NOLINT(performance-unnecessary-value-param): written through
   Root(blocks, session_ratio, run_correlation).apply(columns);
 }
 
@@ -355,9 +355,10 @@ Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sig
   const Index n = static_cast<Index>(rows_.size());
   const double fresh = std::sqrt(1 - run_correlation * run_correlation);
   Eigen::VectorXd own = Eigen::VectorXd::Ones(n);  // each run's scatter
-  if (observations_.scatter.runs.size() > 0 && strata_[stratum].means())
-    own = observations_.scatter.runs(rows_) * std::sqrt(static_cast<double>(n)) /
-          observations_.scatter.runs(rows_).norm();
+  if (observations_.scatter.runs.size() > 0 && strata_[stratum].means()) {
+    own = observations_.scatter.runs(rows_);
+    own *= std::sqrt(static_cast<double>(n)) / own.norm();
+  }
   Stacked result(n * strata_[stratum].modes, static_cast<Index>(sigma.size()));
   for (Index i = 0; i < result.cols(); ++i) {
     for (Index k = 0; k < result.rows(); ++k) result(k, i) = normal(random);
@@ -374,6 +375,12 @@ Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sig
     result.col(i) *= sigma[static_cast<std::size_t>(i)];
   }
   return result;
+}
+
+Stacked MixedModel::simulate_unit(std::size_t stratum, std::size_t ratio, std::size_t sets,
+                                  double run_correlation, std::mt19937_64& random) const {
+  return simulate(stratum, std::vector<double>(sets, 1.0), std::vector<std::size_t>(sets, ratio),
+                  run_correlation, random);
 }
 
 }  // namespace tunnelrig

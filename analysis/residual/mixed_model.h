@@ -86,6 +86,9 @@ class MixedModel {
   Stacked simulate(std::size_t stratum, const std::vector<double>& sigma,
                    const std::vector<std::size_t>& ratio, double run_correlation,
                    std::mt19937_64& random) const;
+  /// `sets` of them, of unit σ and one ratio.
+  Stacked simulate_unit(std::size_t stratum, std::size_t ratio, std::size_t sets, double run_correlation,
+                        std::mt19937_64& random) const;
 
   /// By which rows of rotors are multiplied, c × c: orthonormal where rotors scatter alike. What is the same
   /// in all rotors is in the first mode alone.

@@ -92,6 +92,7 @@ struct Observations {
   std::map<std::string, std::string> not_usable;  // covariate: why (missing in some runs, constant, a text)
   std::vector<std::string> left_out;              // "run: reason"
 
+  std::string baseline_over;            // covariate that a table's line or power law is over; or empty
   std::vector<std::string> other_axes;  // covariates of the same quantity as a linear baseline's column
 
   Eigen::Index rows() const { return y.rows(); }
@@ -101,6 +102,7 @@ struct Observations {
   std::vector<int> all_rows() const;
   /// v = b + g T of a cell: what it reads without a load is no force.
   bool is_line() const { return baseline.starts_with("linear:"); }
+  bool is_power_law() const { return baseline.starts_with("power:"); }
   const Covariate* find(std::string_view wanted) const {
     for (const Covariate& covariate : covariates)
       if (covariate.name == wanted) return &covariate;

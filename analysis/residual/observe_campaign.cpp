@@ -2,18 +2,24 @@
 #include "analysis/reduction.h"
 #include "analysis/residual/observations.h"
 #include "datasets/error.h"
+#include "datasets/locations.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <set>
+#include <string>
 
 namespace tunnelrig {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kOpenSpace = "open space";  // group of all its runs
+constexpr const char* kGround = "ground_distance_R";
+constexpr const char* kCeiling = "ceiling_distance_R";
 using Eigen::Index;
 using Eigen::MatrixXd;
 
@@ -77,10 +83,19 @@ void add_courses(const Source& source, Observations& result) {
   }
 }
 
+/// A condition of a run; distances to ground and ceiling, if no column says them, by the label (GND1.25).
+std::optional<double> condition(const Run& run, const std::string& name) {
+  const auto value = run.number(name);
+  if (value) return value;
+  if (name == kGround) return distance_of(run.location, "GND");
+  if (name == kCeiling) return distance_of(run.location, "CEIL");
+  return {};
+}
+
 void add_sheet_covariates(const Source& source, Observations& result) {
   static const std::set<std::string, std::less<>> kNotConditions = {
       "repeat", "thrust_1_N", "thrust_2_N", "thrust_3_N", "thrust_4_N", "y_norm", "z_norm"};
-  std::set<std::string> names;
+  std::set<std::string> names = {kGround, kCeiling};
   for (Index row = 0; row < source.rows(); ++row)
     for (const auto& [name, value] : source.run(row).numbers)
       if (!kNotConditions.contains(name)) names.insert(name);
@@ -88,12 +103,13 @@ void add_sheet_covariates(const Source& source, Observations& result) {
     Covariate covariate{name, MatrixXd::Constant(source.rows(), 1, kNaN)};
     Index missing = 0;
     for (Index row = 0; row < source.rows(); ++row) {
-      const auto value = source.run(row).number(name);
+      const auto value = condition(source.run(row), name);
       value ? covariate.value(row, 0) = *value : static_cast<double>(++missing);
     }
-    if (missing > 0 && name != "ground_distance_R" && name != "ceiling_distance_R") {
+    const bool may_be_absent = name == kGround || name == kCeiling;
+    if (may_be_absent && missing == source.rows()) continue;
+    if (missing > 0 && !may_be_absent)
       result.not_usable[name] = fmt::format("missing in {} of {} runs", missing, source.rows());
-    }
     result.covariates.push_back(std::move(covariate));
   }
 }
@@ -191,7 +207,7 @@ std::string group_of(const Run& run, const std::string& baseline) {
   const bool open = run.location == "OS" || run.location.starts_with("GND") ||
                     run.location.starts_with("CEIL") || run.number("ground_distance_R") ||
                     run.number("ceiling_distance_R");
-  return baseline == "open_space" && open ? "open space" : run.location;
+  return baseline == "open_space" && open ? kOpenSpace : run.location;
 }
 
 int index_in(std::vector<std::string>& names, const std::string& name) {
@@ -342,6 +358,9 @@ Observations observe_runs(const CampaignData& data, const ObservationChoice& cho
 
 Observations observe_campaign(const CampaignData& data, const ObservationChoice& choice) {
   Observations result = observe(data, choice, false);
+  if (result.baseline == "open_space" && std::ranges::count(result.group_name, kOpenSpace) == 0)
+    throw InputError(
+        "--baseline open_space: no run stands at OS, GND… or CEIL…, or has a distance to ground or ceiling");
   if (!(result.value.maxCoeff() > result.value.minCoeff()))
     throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain",
                                  result.response));

@@ -78,7 +78,7 @@ void add_covariates(const Source& source, Observations& result) {
       if (std::isnan(covariate.value(r, 0))) ++missing;
     }
     if (missing == source.count()) return;
-    if (missing > 0)
+    if (missing > 0 && name != "ground_distance_R" && name != "ceiling_distance_R")
       result.not_usable[name] = fmt::format("missing in {} of {} rows", missing, source.count());
     result.covariates.push_back(std::move(covariate));
   };
@@ -114,7 +114,7 @@ void set_response(const Source& source, const ObservationChoice& choice, Observa
     const Observation& row = source.row(r);
     result.value(r, 0) = source.converted(r, column);
     if (std::isnan(result.value(r, 0)))
-      throw InputError::at(source.table.sheet.file, row.line, "the response {} is empty", result.response);
+      throw InputError::in(row.place, "the response {} is empty", result.response);
     if (!reduced || !row.speed_rpm || !row.diameter_m) continue;
     const double density = dry_air_density_kg_m3(row.air_pressure_Pa, row.air_temperature_C + kZeroCelsius_K);
     result.known(r, 0) =
@@ -130,15 +130,19 @@ bool scatters_alike(const TableSchema& schema, const ObservationChoice& choice) 
   return unit_from_name(schema.response.unit).quantity == "voltage";
 }
 
-/// Groups that pulled the other way are measured by magnitude; a response of both signs is kept as it is.
-void set_scale(Observations& result, bool alike) {
+/// The first row whose response has not the sign of most of its group.
+std::optional<Index> of_other_sign(const Observations& result) {
   std::map<int, double> sign;
   for (Index r = 0; r < result.value.rows(); ++r)
     sign[result.group[static_cast<std::size_t>(r)]] += result.value(r, 0) > 0 ? 1 : -1;
-  bool one_sign = true;
   for (Index r = 0; r < result.value.rows(); ++r)
-    one_sign = one_sign && result.value(r, 0) * sign[result.group[static_cast<std::size_t>(r)]] > 0;
-  result.multiplicative = one_sign && !alike;
+    if (result.value(r, 0) * sign[result.group[static_cast<std::size_t>(r)]] <= 0) return r;
+  return {};
+}
+
+/// Groups that pulled the other way are measured by magnitude; a response of both signs is kept as it is.
+void set_scale(Observations& result, bool alike) {
+  result.multiplicative = !alike && !of_other_sign(result);
   if (result.multiplicative) {
     result.sign = result.value.array().sign();
     result.value = result.value.cwiseAbs();
@@ -203,7 +207,7 @@ void set_belonging(const Source& source, Observations& result) {
   std::map<std::string, int> known;
   for (Index r = 0; r < source.count(); ++r) {
     result.group.push_back(index_in(known, result.group_name, source.row(r).group));
-    result.name.push_back(fmt::format("{}:{}", source.table.sheet.file, source.row(r).line));
+    result.name.push_back(source.row(r).place);
   }
   set_blocks(source, result);
   result.in_tunnel.assign(result.group.size(), false);
@@ -241,7 +245,7 @@ std::vector<bool> held_out_rows(const Source& source, const Observations& result
     for (std::size_t k = 0; k < columns.size(); ++k) values[k] = columns[k](r);
     const double held = expression(values);
     if (held != 0 && held != 1)
-      throw InputError::at(source.table.sheet.file, source.row(r).line,
+      throw InputError::in(source.row(r).place,
                            "this is {:g} here, neither true nor false; write a comparison", held);
     held_out.push_back(held != 0);
   }
@@ -295,13 +299,14 @@ void set_groups_within_blocks(Observations& result) {
 }
 
 /// What the baseline is over is a condition as well: a curve over it shows where a line or a power law is
-/// wrong.
-void keep_as_covariate(const Source& source, const std::string& column, Observations& result) {
-  for (const TableColumn& covariate : source.table.schema.covariates)
-    if (covariate.column == column) return;
+/// wrong. Returns its name there.
+std::string keep_as_covariate(const Source& source, const std::string& column, Observations& result) {
+  for (const TableColumn& each : source.table.schema.covariates)
+    if (each.column == column) return each.meaning.empty() ? column : each.meaning;
   Covariate covariate{column, MatrixXd(source.count(), 1)};
   for (Index r = 0; r < source.count(); ++r) covariate.value(r, 0) = source.cell(r, column);
   if (result.find(column) == nullptr) result.covariates.push_back(std::move(covariate));
+  return column;
 }
 
 /// A table's rows have an order where a condition says so.
@@ -341,16 +346,17 @@ void set_baseline(const Source& source, const ObservationChoice& choice, Observa
     result.known.setOnes();
   }
   if (kind == "power" && !result.multiplicative)
-    throw InputError(fmt::format("--baseline {}: the response has both signs", choice.baseline));
+    throw InputError::in(source.row(*of_other_sign(result)).place,
+                         "--baseline {}: the response must have one sign", choice.baseline);
   result.slopes.resize(source.count(), 1);
   for (Index r = 0; r < source.count(); ++r) {
     const double x = source.cell(r, column);
     if (std::isnan(x) || (kind == "power" && x <= 0))
-      throw InputError::at(source.table.sheet.file, source.row(r).line, "--baseline {}: column {} is {}",
-                           result.baseline, column, std::isnan(x) ? "empty" : "not above 0");
+      throw InputError::in(source.row(r).place, "--baseline {}: column {} is {}", result.baseline, column,
+                           std::isnan(x) ? "empty" : "not above 0");
     result.slopes(r, 0) = kind == "power" ? std::log(x) : x;
   }
-  keep_as_covariate(source, column, result);
+  result.baseline_over = keep_as_covariate(source, column, result);
   if (kind == "linear") set_other_axes(source.table.schema, column, result);
 }
 

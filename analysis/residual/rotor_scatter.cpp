@@ -1,5 +1,7 @@
 #include "analysis/residual/rotor_scatter.h"
 
+#include "analysis/residual/alike.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -11,9 +13,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr int kAlikeSets = 200;
-constexpr Index kFewestToCompare = 3;  // of two, nothing says which of them scatters
 
 /// Variance of what each rotor's runs have of their own, whatever they have in common; those of `alike` share
 /// one. A rotor's distance from the mean of all, weighted by 1/d_i, has the variance d_i − 1/Σ(1/d): a fixed
@@ -63,15 +62,14 @@ VectorXd rotor_scatter(const Observations& observations, const std::vector<int>&
   seen.scatter = {};
   std::vector<Index> alike(static_cast<std::size_t>(observations.channels()));
   std::iota(alike.begin(), alike.end(), Index{0});
-  while (static_cast<Index>(alike.size()) >= kFewestToCompare) {
+  while (alike.size() >= kFewestToCompare) {
     const MixedModel model(seen, rows);
     const NullFit fit = CandidateScan(model, {}, {}).null_fit(residual);
     const std::size_t s = differences_stratum(model), ratio = fit.ratio[s];
     const MatrixXd rotors = differences(model, s, ratio, model.stack(s, {&residual}));
     Index most = 0;
     const double unlike = unlikeness(rotors, alike).cwiseAbs().maxCoeff(&most);
-    const Stacked sets = model.simulate(s, std::vector<double>(kAlikeSets, 1.0),
-                                        std::vector<std::size_t>(kAlikeSets, ratio), 0, random);
+    const Stacked sets = model.simulate_unit(s, ratio, kAlikeSets, 0, random);
     bool by_chance = false;
     for (Index i = 0; i < sets.cols() && !by_chance; ++i)
       by_chance =

@@ -35,8 +35,7 @@ struct Spread {
 Spread simulated(const MixedModel& model, const NullFit& fit, std::size_t stratum, double correlation,
                  std::mt19937_64& random) {
   const std::size_t ratio = fit.ratio[stratum];
-  Stacked data = model.simulate(stratum, std::vector<double>(kSimulated, 1.0),
-                                std::vector<std::size_t>(kSimulated, ratio), correlation, random);
+  Stacked data = model.simulate_unit(stratum, ratio, kSimulated, correlation, random);
   model.project(stratum, ratio, data);
   const Eigen::VectorXd seen = of_neighbours(model, stratum, data);
   return {seen.mean(), std::sqrt((seen.array() - seen.mean()).square().mean())};

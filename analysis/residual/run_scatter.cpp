@@ -1,5 +1,6 @@
 #include "analysis/residual/run_scatter.h"
 
+#include "analysis/residual/alike.h"
 #include "analysis/residual/upper_median.h"
 
 #include <algorithm>
@@ -13,49 +14,21 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kAlikeSets = 200;
 constexpr double kUnlike = 2;  // less makes no structure
 constexpr double kLeastLeft = 1e-3;
-constexpr std::size_t kFewest = 3;  // of two, nothing says which of them scatters
 
-/// Mean size of what is left of each run, over its standard deviation, of the means' strata; a column for
-/// each data set.
-class Sizes {
- public:
-  Sizes(const MixedModel& model, const NullFit& variances) : model_(model), variances_(variances) {}
-
-  MatrixXd of(const Components& residual) const {
-    return sum(1, [&](std::size_t s) { return model_.stack(s, {&residual}); });
-  }
-  MatrixXd simulated(std::mt19937_64& random) const {
-    return sum(kAlikeSets, [&](std::size_t s) {
-      return model_.simulate(s, std::vector<double>(kAlikeSets, variances_.sigma[s]),
-                             std::vector<std::size_t>(kAlikeSets, variances_.ratio[s]), 0, random);
-    });
-  }
-
- private:
-  template <class Data>
-  MatrixXd sum(Index sets, const Data& data) const {
-    const auto n = static_cast<Index>(model_.rows().size());
-    MatrixXd result = MatrixXd::Zero(n, sets);
-    for (std::size_t s = 0; s < model_.strata().size(); ++s) {
-      if (!model_.strata()[s].means()) continue;
-      Stacked stacked = data(s);
-      model_.project(s, variances_.ratio[s], stacked);
-      for (Index set = 0; set < sets; ++set)
-        result.col(set) += Eigen::Map<const MatrixXd>(stacked.col(set).data(), n, model_.strata()[s].modes)
-                               .cwiseAbs()
-                               .rowwise()
-                               .sum() /
-                           variances_.sigma[s];
-    }
-    return result;
-  }
-
-  const MixedModel& model_;
-  const NullFit& variances_;
-};
+/// The size of what is left of each run, over σ, summed over the modes; a column for each data set.
+MatrixXd sizes_of(const MixedModel& model, std::size_t stratum, std::size_t ratio, Stacked data) {
+  model.project(stratum, ratio, data);
+  const auto n = static_cast<Index>(model.rows().size());
+  MatrixXd result(n, data.cols());
+  for (Index set = 0; set < data.cols(); ++set)
+    result.col(set) = Eigen::Map<const MatrixXd>(data.col(set).data(), n, model.strata()[stratum].modes)
+                          .cwiseAbs()
+                          .rowwise()
+                          .sum();
+  return result;
+}
 
 /// Of each set of runs: ln of its mean size over what runs that are alike have there.
 struct Compared {
@@ -104,7 +77,7 @@ void let_differ(const std::vector<int>& number, const std::vector<int>& rows, co
   // Nothing is left of the only run at a location, nor of a session of such.
   std::erase_if(by_number,
                 [&](const auto& set) { return alike(set.second, Eigen::all).mean() < kLeastLeft; });
-  if (by_number.size() < kFewest) return;
+  if (by_number.size() < kFewestToCompare) return;
   std::vector<std::vector<Index>> sets;
   for (const auto& [of, runs] : by_number) sets.push_back(runs);
   const VectorXd times = scatter_of(compare(size, alike, sets));
@@ -119,8 +92,14 @@ void let_differ(const std::vector<int>& number, const std::vector<int>& rows, co
 VectorXd run_scatter(const Observations& observations, const MixedModel& model, const NullFit& variances,
                      const Components& residual, std::mt19937_64& random) {
   if (observations.from_table) return {};
-  const Sizes sizes(model, variances);
-  const MatrixXd size = sizes.of(residual), alike = sizes.simulated(random);
+  const auto n = static_cast<Index>(model.rows().size());
+  MatrixXd size = MatrixXd::Zero(n, 1), alike = MatrixXd::Zero(n, kAlikeSets);
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
+    if (!model.strata()[s].means()) continue;
+    const std::size_t ratio = variances.ratio[s];
+    size += sizes_of(model, s, ratio, model.stack(s, {&residual}) / variances.sigma[s]);
+    alike += sizes_of(model, s, ratio, model.simulate_unit(s, ratio, kAlikeSets, 0, random));
+  }
   VectorXd result = VectorXd::Ones(observations.rows());
   let_differ(observations.group, model.rows(), size, alike, result);
   // A session is not wilder for its runs at a wild location.

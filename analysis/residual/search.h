@@ -43,8 +43,11 @@ class Search {
   // named effects: search_effects.cpp
   void add_effects();
   static bool already_in(const Term& way, const MeanModel& model);
-  /// All candidates on top of a model, but for what it has.
+  /// All candidates on top of a model, but for what it has, with one amplitude for all groups.
   Scan scan_effects(const JointFit& base) const;
+  /// And with an amplitude of each group's own.
+  Scan scan_effects_and_groups(const JointFit& base) const;
+  Scan list_effects(const JointFit& base) const;  // as scan_effects, without fits
   Candidate candidate_of(const Term& way, const Eigen::MatrixXd& predicted) const;
   void rank(const JointFit& base, Scan& scan) const;
   bool add_best_effect();
@@ -56,9 +59,20 @@ class Search {
   /// of a second cause.
   std::optional<std::string> only_bends(const Term& term, const NullFit& variances,
                                         const CrossValidation& with_term) const;
+  struct InGroups;  // the model with a last term whose amplitude is each group's own
+  void add_group_ways(Scan& scan) const;
+  InGroups fit_in_groups(Term term, MeanModel model) const;
+  /// How far the leave-one-block-out error falls; nothing where the rules refuse it. `before_others`: also
+  /// where another name does as well for all groups alike.
+  std::optional<double> gain_of(const InGroups& own, bool before_others) const;
+  void take(InGroups own);
   /// The newest effect with an amplitude of each group's own, where the data ask for it.
-  /// `before_others`: not where another name does as well for all groups alike.
   void let_groups_differ(bool before_others);
+  /// An effect that is nothing on the whole, because groups have it with either sign.
+  bool accept_in_groups(const Term& way, double p);
+  /// In place of a candidate with amplitudes of the groups' own: the same effect alike in all, if α lets it
+  /// in.
+  std::size_t alike_instead(const Scan& scan, std::size_t i) const;
   bool groups_within_bounds(const Observations& wider, const MeanModel& model) const;
   bool another_does_as_well(const CrossValidation& own, const NullFit& variances) const;
   /// Whether a course that is straight or bends once over the order of runs does as well as the step.
@@ -108,6 +122,9 @@ class Search {
   void drop(std::size_t t, const JointFit& without);
   /// The same, and gives the newest curve the straight part that no name takes any more.
   void give_way_to_curve(std::size_t t, const JointFit& without);
+  /// What an effect goes by: its covariates; with `power:COLUMN` that column for a function of the force
+  /// alone, because a bend there is as likely the law's as the cell's.
+  std::vector<std::string> conditions_of(const Effect& effect) const;
   /// Whether a curve does all that an effect's only condition does, so that a name beside it means nothing.
   bool is_work_of_a_curve(const Term& term) const;
   /// Effects whose own covariate bends away from their formula give way to a curve.

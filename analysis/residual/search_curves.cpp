@@ -43,8 +43,7 @@ Search::CurveScan Search::scan_curves() const {
   for (const Curve& each : curves_) {
     if (is_described(each)) continue;
     const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
-      return each.place.name.empty() && a.term.rotor == each.rotor &&
-             is_over(each, a.term.effect->covariates);
+      return each.everywhere() && a.term.rotor == each.rotor && is_over(each, a.term.effect->covariates);
     });
     // What is straight over few values has a name then, and the bends ask for the rest.
     if (named && each.shape == CurveShape::kLevels) continue;
@@ -143,7 +142,7 @@ void Search::doubt_formulas() {
         static_cast<int>(result_.curves.size()) >= settings_.most_curves)
       continue;
     for (const Curve& curve : curves_) {
-      if (!is_bend_over(curve, term.effect->covariates, term.rotor) || is_described(curve)) continue;
+      if (!is_bend_over(curve, conditions_of(*term.effect), term.rotor) || is_described(curve)) continue;
       const Curve bend = without_trend(curve, rows_);
       Scan scan;
       scan.candidates.push_back(as_candidate(bend));
@@ -207,8 +206,15 @@ void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
   read_back_terms();
 }
 
+std::vector<std::string> Search::conditions_of(const Effect& effect) const {
+  const bool of_force_alone = effect.covariates.empty() && effect.scope != EffectScope::kPair &&
+                              !effect.needs_previous && !effect.has_change_point();
+  if (!of_force_alone || !observations_.is_power_law()) return effect.covariates;
+  return {observations_.baseline_over};
+}
+
 bool Search::is_work_of_a_curve(const Term& term) const {
-  const auto& names = term.effect->covariates;
+  const auto names = conditions_of(*term.effect);
   return !term.per_group &&
          std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
            const auto varies_beside_it = [&](const std::string& name) {
@@ -216,15 +222,14 @@ bool Search::is_work_of_a_curve(const Term& term) const {
              return other != nullptr && !observations_.not_usable.contains(name) &&
                     other->value.maxCoeff() > other->value.minCoeff();
            };
-           return found.curve.place.name.empty() && found.curve.tilt.empty() &&
-                  found.curve.rotor == term.rotor && is_over(found.curve, names) &&
-                  std::none_of(names.begin(), names.end(), varies_beside_it);
+           return found.curve.everywhere() && found.curve.tilt.empty() && found.curve.rotor == term.rotor &&
+                  is_over(found.curve, names) && std::none_of(names.begin(), names.end(), varies_beside_it);
          });
 }
 
 bool Search::outshone_by_curve(const Term& term) const {
   const Curve& curve = result_.curves.back().curve;
-  if (curve.tilt.empty() || !is_over(curve, term.effect->covariates)) return false;
+  if (curve.tilt.empty() || !is_over(curve, conditions_of(*term.effect))) return false;
   const AmplitudeFit fit = fit_amplitudes(observations_, difference(y_, fit_.linear.offset),
                                           fit_.linear.columns, fit_.variances, rows_);
   const auto columns = static_cast<Eigen::Index>(curve.columns.size());

@@ -53,6 +53,12 @@ bool Search::already_in(const Term& way, const MeanModel& model) {
 }
 
 Search::Scan Search::scan_effects(const JointFit& base) const {
+  Scan scan = list_effects(base);
+  rank(base, scan);
+  return scan;
+}
+
+Search::Scan Search::list_effects(const JointFit& base) const {
   Scan scan;
   const Eigen::MatrixXd predicted = predict_response(observations_, base.model, rows_);
   for (const Term& way : ways_) {
@@ -62,7 +68,6 @@ Search::Scan Search::scan_effects(const JointFit& base) const {
     scan.ways.push_back(way);
     scan.candidates.push_back(std::move(candidate));
   }
-  rank(base, scan);
   return scan;
 }
 
@@ -87,7 +92,7 @@ void Search::rank(const JointFit& base, Scan& scan) const {
 
 bool Search::add_best_effect() {
   settings_.progress(fmt::format("looking for effect {}", result_.accepted.size() + 1));
-  const Scan scan = scan_effects(fit_);
+  const Scan scan = scan_effects_and_groups(fit_);
   Round round;
   if (scan.order.empty()) return false;
   NullMaxima maxima(*scan.scan, fit_.variances, settings_, ++salt_);
@@ -112,10 +117,11 @@ std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const 
       return r.term.effect->name == scan.ways[i].effect->name;
     });
     if (seen) continue;
-    const double evidence = scan.fits[i].evidence, ratio = scan.fits[i].likelihood_ratio;
-    const double amplitude = scan.fits[i].amplitude.size() > 0 ? scan.fits[i].amplitude(0) : 0;
-    result.push_back({scan.ways[i], evidence, maxima.p(evidence), amplitude,
-                      ratio > 0 ? std::abs(amplitude) / std::sqrt(2 * ratio) : 0});
+    const CandidateFit& fit = scan.fits[i];
+    const bool one = fit.amplitude.size() == 1 && fit.likelihood_ratio > 0;
+    const double amplitude = fit.amplitude.size() > 0 ? fit.amplitude.mean() : 0;
+    result.push_back({scan.ways[i], fit.evidence, maxima.p(fit.evidence), amplitude,
+                      one ? std::abs(amplitude) / std::sqrt(2 * fit.likelihood_ratio) : 0});
   }
   return result;
 }
@@ -124,10 +130,21 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
   std::vector<const Effect*> refused;
   const CrossValidation before = cross_validate(observations_, difference(y_, fit_.linear.offset),
                                                 fit_.linear.columns, fit_.variances, rows_);
-  for (const std::size_t i : scan.order) {
-    if (scan.fits[i].evidence < critical_) break;
-    if (std::find(refused.begin(), refused.end(), scan.ways[i].effect) != refused.end()) continue;
-    refused.push_back(scan.ways[i].effect);
+  for (const std::size_t best : scan.order) {
+    if (scan.fits[best].evidence < critical_) break;
+    if (std::find(refused.begin(), refused.end(), scan.ways[best].effect) != refused.end()) continue;
+    refused.push_back(scan.ways[best].effect);
+    const std::size_t i = alike_instead(scan, best);
+    if (scan.ways[i].per_group) {
+      if (accept_in_groups(scan.ways[i], maxima.p(scan.fits[i].evidence))) {
+        round.outcome += "accepted " + result_.accepted.back().term.label();
+        return true;
+      }
+      round.outcome +=
+          fmt::format("{} predicts unseen blocks no better, or not better than what is alike in all; ",
+                      scan.ways[i].label());
+      continue;
+    }
     JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
     const Term& term = fit.model.terms.back();
     // Its own amplitude, and those of the effects before it, which it may push out.
@@ -161,8 +178,6 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
     result_.accepted.push_back({.term = term,
                                 .p = maxima.p(scan.fits[i].evidence),
                                 .gain = before.rmse() - after.rmse(),
-                                .loss_gain = gain.mean,
-                                .loss_standard_error = gain.standard_error,
                                 .confounded = {}});
     fit_ = std::move(fit);
     read_back_terms();
@@ -177,10 +192,10 @@ std::optional<std::string> Search::only_bends(const Term& term, const NullFit& v
                                               const CrossValidation& with_term) const {
   for (const Curve& curve : curves_) {
     const auto shares = [&](const Accepted& other) {
-      return is_over(curve, other.term.effect->covariates) &&
+      return is_over(curve, conditions_of(*other.term.effect)) &&
              (other.term.rotor < 0 || other.term.rotor == term.rotor);
     };
-    if (!is_bend_over(curve, term.effect->covariates, term.rotor) ||
+    if (!is_bend_over(curve, conditions_of(*term.effect), term.rotor) ||
         std::none_of(result_.accepted.begin(), result_.accepted.end(), shares))
       continue;
     std::vector<Components> columns = fit_.linear.columns;
@@ -281,9 +296,12 @@ JointFit Search::fit_without(std::size_t t) const {
 void Search::set_detectable(const Scan& scan) {
   std::map<std::string, std::vector<std::pair<double, std::size_t>>> errors;  // rms of one; of each way
   for (std::size_t i = 0; i < scan.candidates.size(); ++i) {
+    const Term& way = scan.ways[i];
+    const bool alike = way.rotor < 0 || way.effect->scope == EffectScope::kPair;
+    if (!alike || way.per_group) continue;
     const double z = std::sqrt(2 * scan.fits[i].likelihood_ratio);
     const double size = std::abs(scan.fits[i].amplitude(0)) * rms_of(scan.candidates[i].columns[0][0]);
-    if (z > 0 && size > 0) errors[scan.ways[i].effect->name].emplace_back(size / z, i);
+    if (z > 0 && size > 0) errors[way.effect->name].emplace_back(size / z, i);
   }
   if (errors.empty()) return;
   result_.detectable_sigma = 0;

@@ -5,45 +5,118 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 namespace tunnelrig {
 
 using Eigen::Index;
 
+struct Search::InGroups {
+  Observations observations;  // the term's column is a slope of each group's baseline
+  JointFit fit;
+};
+
+/// Only effects that may have either sign: of the others, what all groups have in common is seen first.
+Search::Scan Search::scan_effects_and_groups(const JointFit& base) const {
+  Scan scan = list_effects(base);
+  if (observations_.channels() == 1) add_group_ways(scan);
+  rank(base, scan);
+  return scan;
+}
+
+void Search::add_group_ways(Scan& scan) const {
+  constexpr std::size_t kMostGroups = 24;
+  constexpr double kWeight = 0.25;  // as for one rotor alone
+  std::set<int> groups;
+  for (const int row : rows_) groups.insert(observations_.group[static_cast<std::size_t>(row)]);
+  if (groups.size() < 2 || groups.size() > kMostGroups) return;
+  const std::size_t alike = scan.ways.size();
+  for (std::size_t i = 0; i < alike; ++i) {
+    const auto& parameters = scan.ways[i].effect->parameters;
+    if (parameters.size() > 1 || parameters[0].theory || parameters[0].lower >= 0 || parameters[0].upper <= 0)
+      continue;
+    Candidate own{.columns = {}, .sign = 0, .weight = kWeight};
+    for (const int group : groups) {
+      Components column = scan.candidates[i].columns[0];
+      for (Index row = 0; row < observations_.rows(); ++row)
+        if (observations_.group[static_cast<std::size_t>(row)] != group)
+          for (Eigen::MatrixXd& component : column) component.row(row).setZero();
+      if (mixed_->sees(column)) own.columns.push_back(std::move(column));
+    }
+    if (own.columns.size() < 2) continue;
+    scan.ways.push_back(scan.ways[i]);
+    scan.ways.back().per_group = true;
+    scan.candidates.push_back(std::move(own));
+  }
+}
+
+Search::InGroups Search::fit_in_groups(Term term, MeanModel model) const {
+  term.per_group = true;
+  term.at_theory = false;
+  term.parameters[0] = 0;
+  InGroups own{observations_, {}};
+  const TermResponse response =
+      respond(term, observations_, predict_response(observations_, fit_.model, rows_));
+  Eigen::MatrixXd& slopes = own.observations.slopes;
+  slopes.conservativeResize(Eigen::NoChange, slopes.cols() + 1);
+  slopes.rightCols(1) = response.derivative[0][0];
+  model.terms.push_back(std::move(term));
+  own.fit = fit_jointly(own.observations, model, rows_);
+  return own;
+}
+
+std::optional<double> Search::gain_of(const InGroups& own, bool before_others) const {
+  const JointFit& fit = own.fit;
+  if (!fit.at_bound.empty()) return {};
+  const CrossValidation after = cross_validate(own.observations, difference(y_, fit.linear.offset),
+                                               fit.linear.columns, fit.variances, rows_);
+  const CrossValidation before = cross_validate(observations_, difference(y_, fit_.linear.offset),
+                                                fit_.linear.columns, fit.variances, rows_);
+  const LossDifference gain = compare(before, after);
+  if (!(gain.mean > gain.standard_error) || !groups_within_bounds(own.observations, fit.model)) return {};
+  if (before_others && another_does_as_well(after, fit.variances)) return {};
+  return before.rmse() - after.rmse();
+}
+
+void Search::take(InGroups own) {
+  observations_ = std::move(own.observations);
+  make_models();
+  fit_ = std::move(own.fit);
+  read_back_terms();
+}
+
 void Search::let_groups_differ(bool before_others) {
   if (observations_.channels() > 1 || observations_.groups() < 2 || result_.accepted.empty() ||
       result_.accepted.back().term.per_group)
     return;
-  const Term shared = result_.accepted.back().term;
-  Term own = shared;
-  own.per_group = true;
-  own.at_theory = false;
-  own.parameters[0] = 0;
-  Observations wider = observations_;
-  const TermResponse response = respond(own, wider, predict_response(wider, fit_.model, rows_));
-  wider.slopes.conservativeResize(Eigen::NoChange, wider.slopes.cols() + 1);
-  wider.slopes.rightCols(1) = response.derivative[0][0];
-  MeanModel model = fit_.model;
-  model.terms.back() = own;
-  JointFit fit = fit_jointly(wider, model, rows_);
-  const auto before = sum_of_squares(observations_, fit_), after = sum_of_squares(wider, fit);
+  MeanModel others = fit_.model;
+  others.terms.pop_back();
+  InGroups own = fit_in_groups(result_.accepted.back().term, std::move(others));
+  const auto before = sum_of_squares(observations_, fit_), after = sum_of_squares(own.observations, own.fit);
   const double more = before.second - after.second;
   if (more <= 0 || after.second <= 0) return;
   const double f = (before.first - after.first) / more / (after.first / after.second);
   if (!(f > 0) || f_upper_p(f, more, after.second) > settings_.alpha) return;
-  if (!fit.at_bound.empty()) return;
-  const CrossValidation with_own =
-      cross_validate(wider, difference(y_, fit.linear.offset), fit.linear.columns, fit.variances, rows_);
-  const LossDifference gain = compare(cross_validate(observations_, difference(y_, fit_.linear.offset),
-                                                     fit_.linear.columns, fit.variances, rows_),
-                                      with_own);
-  if (!(gain.mean > gain.standard_error)) return;
-  if (!groups_within_bounds(wider, fit.model)) return;
-  if (before_others && another_does_as_well(with_own, fit.variances)) return;
-  observations_ = std::move(wider);
-  make_models();
-  fit_ = std::move(fit);
-  read_back_terms();
+  if (gain_of(own, before_others)) take(std::move(own));
+}
+
+bool Search::accept_in_groups(const Term& way, double p) {
+  InGroups own = fit_in_groups(way, fit_.model);
+  const std::optional<double> gain = gain_of(own, true);
+  if (!gain) return false;
+  result_.accepted.push_back({.term = own.fit.model.terms.back(), .p = p, .gain = *gain, .confounded = {}});
+  take(std::move(own));
+  return true;
+}
+
+std::size_t Search::alike_instead(const Scan& scan, std::size_t i) const {
+  if (!scan.ways[i].per_group) return i;
+  for (const std::size_t other : scan.order)
+    if (scan.ways[other].effect == scan.ways[i].effect && !scan.ways[other].per_group &&
+        scan.fits[other].evidence >= critical_)
+      return other;
+  return i;
 }
 
 bool Search::another_does_as_well(const CrossValidation& own, const NullFit& variances) const {

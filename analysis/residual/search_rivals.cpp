@@ -2,6 +2,7 @@
 #include "analysis/residual/search.h"
 
 #include <algorithm>
+#include <iterator>
 
 namespace tunnelrig {
 
@@ -54,6 +55,15 @@ std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& wit
     if (compare(validate(scan.ways[i], scan.candidates[i]), *own).told_apart()) continue;
     Term term = scan.ways[i];
     term.parameters[0] = term.effect->theory_only ? *term.effect->theory() : scan.fits[i].amplitude(0);
+    // What the others must be beside it is physical as well.
+    MeanModel instead = without.model;
+    instead.terms.push_back(term);
+    instead.terms.back().at_theory = term.effect->theory_only;
+    const JointFit fit = fit_jointly(observations_, instead, rows_);
+    const auto& terms = fit.model.terms;
+    if (std::any_of(terms.begin(), std::prev(terms.end()),
+                    [&](const Term& each) { return at_bound(fit, each); }))
+      continue;
     result.push_back({term, scan.fits[i].evidence, 0, term.parameters[0], 0});
   }
   return result;

@@ -154,7 +154,7 @@ VectorXd distances(const Observations& observations, const Term& first, const Te
 }
 
 std::string in_words(const SeparatingRun& run, const Observations& observations) {
-  std::string text = "a run at " + run.location;
+  std::string text = run.location.empty() ? "a run" : "a run at " + run.location;
   for (const auto& [name, value] : run.setting) {
     const Covariate* covariate = observations.find(name);
     const std::string unit = covariate == nullptr || covariate->unit == "1" ? "" : covariate->unit;

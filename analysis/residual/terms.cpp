@@ -1,5 +1,6 @@
 #include "analysis/residual/terms.h"
 
+#include "analysis/residual/joint_fit.h"
 #include "analysis/residual/upper_median.h"
 
 #include <algorithm>
@@ -48,6 +49,7 @@ class Evaluation {
         parameters_[k].v[static_cast<Index>(k)] = 1;
     }
     within_ = term.effect->within_time() && !observations.shape.empty();
+    if (term.effect->needs_previous) set_errors();
   }
 
   bool applies(Index row, Index channel) const {
@@ -81,14 +83,50 @@ class Evaluation {
 
   Sample sample_of(Index row, Index channel) {
     for (std::size_t k = 0; k < covariates_.size(); ++k) x_[k] = covariates_[k]->at(row, channel);
-    const int before = observations_.previous[static_cast<std::size_t>(row)];
     return {.x = x_,
             .reference = reference_,
-            .previous_N = before < 0 ? std::numeric_limits<double>::quiet_NaN() : force_of(before, channel),
+            .previous_N = previous_force(row, channel),
+            .previous_error_N = previous_error(row, channel),
             .other_N = term_.other < 0 ? 0 : force_of(row, term_.other),
             .newtons_per_volt =
                 channel < observations_.newtons_per_volt.size() ? observations_.newtons_per_volt(channel) : 1,
             .rig = &observations_.rig};
+  }
+
+  /// Of the run before; this run's own where that was nearly the same at the same place: which of the two was
+  /// larger depends on what the model does not have.
+  double previous_force(Index row, Index channel) const {
+    constexpr double kSame = 0.01;
+    const int before = observations_.previous[static_cast<std::size_t>(row)];
+    if (before < 0) return std::numeric_limits<double>::quiet_NaN();
+    const double own = force_of(row, channel), previous = force_of(before, channel);
+    const bool repeated = observations_.group[static_cast<std::size_t>(before)] ==
+                          observations_.group[static_cast<std::size_t>(row)];
+    return repeated && std::abs(previous - own) < kSame * std::abs(own) ? own : previous;
+  }
+
+  /// Of the groups' constants, by what is left beside the prediction.
+  void set_errors() {
+    const MatrixXd fitted = observations_.multiplicative
+                                ? MatrixXd((predicted_.array() / observations_.known.array()).log())
+                                : predicted_;
+    const double free =
+        std::max<double>(1, static_cast<double>(observations_.rows() - observations_.groups()));
+    const Eigen::RowVectorXd variance = (observations_.y - fitted).colwise().squaredNorm() / free;
+    VectorXd count = VectorXd::Zero(observations_.groups());
+    for (const int group : observations_.group) count(group) += 1;
+    constant_variance_ = count.cwiseMax(1).cwiseInverse() * variance;
+  }
+
+  /// Of the difference between the forces of this run and the one before it.
+  double previous_error(Index row, Index channel) const {
+    const int before = observations_.previous[static_cast<std::size_t>(row)];
+    if (constant_variance_.size() == 0 || before < 0) return 0;
+    const int own = observations_.group[static_cast<std::size_t>(row)],
+              other = observations_.group[static_cast<std::size_t>(before)];
+    if (own == other) return 0;
+    const double error = std::sqrt(constant_variance_(own, channel) + constant_variance_(other, channel));
+    return observations_.multiplicative ? error * std::abs(force_of(row, channel)) : error;
   }
 
   /// log(F'/F) where the model is multiplicative, F' − F where it is not.
@@ -112,6 +150,7 @@ class Evaluation {
   std::vector<const Covariate*> covariates_;
   std::vector<double> x_;
   EffectJet parameters_[kMaxEffectParameters];
+  MatrixXd constant_variance_;  // groups × c; of effects of the run before
   bool within_ = false;
 };
 
@@ -140,23 +179,31 @@ bool forces_differ(const Observations& observations) {
   double variance = 0, noise = 0;
   const double n = static_cast<double>(observations.rows()), groups = observations.groups();
   if (n <= groups) return true;
+  MatrixXd known = MatrixXd::Zero(observations.rows(), observations.channels());
+  const std::vector<Term> terms = known_terms(observations);
+  if (!terms.empty()) {
+    const MatrixXd nominal = predict_response(observations, {}, observations.all_rows());
+    for (const Term& term : terms) known += respond(term, observations, nominal).value[0];
+  }
+  const MatrixXd y = observations.y - known;
   MatrixXd along_lines;  // where the baseline's lines, not its constants, are what makes forces differ
   if (observations.slopes.cols() > 0)
     along_lines = predict_response(observations, {}, observations.all_rows());
   for (Index c = 0; c < observations.channels(); ++c) {
     VectorXd sum = VectorXd::Zero(observations.groups()), count = sum;
     for (Index row = 0; row < observations.rows(); ++row) {
-      sum(observations.group[static_cast<std::size_t>(row)]) += observations.y(row, c);
+      sum(observations.group[static_cast<std::size_t>(row)]) += y(row, c);
       count(observations.group[static_cast<std::size_t>(row)]) += 1;
     }
     const VectorXd constant = (sum.array() / count.array().max(1))(observations.group);
     VectorXd force = observations.multiplicative
                          ? VectorXd(constant.array() + observations.known.col(c).array().log())
                          : constant;
+    force += known.col(c);
     if (along_lines.size() > 0)
       force = observations.multiplicative ? VectorXd(along_lines.col(c).array().log()) : along_lines.col(c);
     variance += (force.array() - force.mean()).square().mean();
-    noise += (observations.y.col(c) - constant).squaredNorm() / (n - groups) * groups / n;
+    noise += (y.col(c) - constant).squaredNorm() / (n - groups) * groups / n;
   }
   return variance > least * noise;
 }
@@ -218,7 +265,9 @@ Testability testability(const Effect& effect, const Observations& observations) 
       observations.assumed.contains("air_temperature_C"))
     result.missing.emplace_back("air_temperature_C");
   else if (effect.name == "air_temperature" && !observations.bare_thrust)
-    result.reason = "only a table's thrust is held against a baseline without the density of its air";
+    result.reason =
+        "only a table's thrust (meaning = \"thrust_N\") is held against a baseline without the density of "
+        "its air";
   if (effect.scope == EffectScope::kPair && observations.channels() < 2)
     result.reason = "the response has one channel";
   if (effect.tunnel_only &&
@@ -238,6 +287,14 @@ Testability testability(const Effect& effect, const Observations& observations) 
   else if (effect.needs_previous && !forces_differ(observations))
     result.reason = "the forces differ too little beside their scatter for the run before to tell";
   return result;
+}
+
+std::vector<Term> known_terms(const Observations& observations) {
+  std::vector<Term> terms;
+  for (const Effect& effect : all_effects())
+    if (effect.theory_only && !observations.from_table && testability(effect, observations).ok())
+      terms.push_back({.effect = &effect, .at_theory = true, .parameters = {*effect.theory()}});
+  return terms;
 }
 
 std::vector<Term> ways_to_try(const Effect& effect, const Observations& observations,

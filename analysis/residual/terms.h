@@ -45,6 +45,10 @@ struct Testability {
 };
 Testability testability(const Effect& effect, const Observations& observations);
 
+/// What is known whatever the data say: of a campaign whose speeds were measured, that thrust goes with their
+/// square.
+std::vector<Term> known_terms(const Observations& observations);
+
 /// All ways to try an effect: rotors, shapes on their grids, change-points with three of `open_blocks` on
 /// each side.
 std::vector<Term> ways_to_try(const Effect& effect, const Observations& observations,

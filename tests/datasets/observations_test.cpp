@@ -126,6 +126,41 @@ TEST(Rcbenchmark, SweepsTableNamesGroups) {
               HasSubstr("has no row for b.csv"));
 }
 
+TEST(Rcbenchmark, RowsOfAFolderAreNamedByTheirOwnFileAndLine) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "in");
+  const std::string header = "Thrust (N),Motor Optical Speed (RPM)\n";
+  write_text(folder / "in/a.csv", header + "1,3000\n2,4000\n");
+  write_text(folder / "in/b.csv", header + "1,3000\n\n2,4000\n");
+  store_table(read_rcbenchmark(folder / "in", {}), folder / "c.db", false);
+  const auto table = observations_of(CampaignFile(folder / "c.db", CampaignFile::Access::kRead));
+  ASSERT_EQ(table.rows.size(), 4u);
+  EXPECT_EQ(table.rows[1].place, "a.csv:3");
+  EXPECT_EQ(table.rows[3].place, "b.csv:4");
+  write_text(folder / "in/b.csv", header + "1,3000\nmuch,4000\n");
+  EXPECT_THAT(message_of([&] { read_rcbenchmark(folder / "in", {}); }),
+              HasSubstr("b.csv:3: column Thrust (N): 'much' is not a finite decimal number"));
+}
+
+TEST(Rcbenchmark, SweepsWithoutATachometerAreThrustAlone) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "s.csv",
+             "ESC signal (µs),Thrust (gf),Motor Optical Speed (RPM)\n1200,10,0\n1400,40,0\n");
+  const auto table = read_rcbenchmark(folder / "s.csv", {});
+  EXPECT_FALSE(table.schema.speed_column);
+  EXPECT_FALSE(table.rows[1].speed_rpm);
+  EXPECT_NEAR(table.rows[1].response, 0.04 * 9.80665, 1e-12);
+  EXPECT_THAT(message_of([&] { read_rcbenchmark(folder / "s.csv", {.pole_count = 14}); }),
+              HasSubstr("--pole-count: no column Motor Optical Speed or Motor Electrical Speed has a value"));
+}
+
+TEST(Rcbenchmark, SemicolonsAreNamed) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "s.csv", "Thrust (N);Voltage (V);Current (A)\n1;12;3\n");
+  EXPECT_THAT(message_of([&] { read_rcbenchmark(folder / "s.csv", {}); }),
+              HasSubstr("separated by semicolons"));
+}
+
 TEST(Rcbenchmark, StrawsonMotors) {
   SKIP_WITHOUT_SHARED_DATA();
   const auto table =

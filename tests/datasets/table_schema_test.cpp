@@ -151,7 +151,7 @@ TEST(TableSchema, AStoredTableKeepsTheNamesAndLinesOfItsFiles) {
   const ObservationTable table = observations_of(CampaignFile(folder / "c.db", CampaignFile::Access::kRead));
   EXPECT_EQ(table.schema.file, "mine.toml");
   EXPECT_EQ(table.sheet.file, "mine.csv");
-  EXPECT_EQ(table.rows[1].line, 4);
+  EXPECT_EQ(table.rows[1].place, "mine.csv:4");
 }
 
 }  // namespace

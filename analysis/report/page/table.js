@@ -38,12 +38,12 @@ function usualRange(groups) {
 const outside = (groups, [low, high]) => groups.flatMap((g) => g.c_t).filter((c_t) => c_t < low || c_t > high);
 
 /** What is not in the curves, and what in them is not to be believed. */
-function reservations({unknown, at_rest: atRest, doubtful_lines: doubtful}) {
-  const lines = doubtful.slice(0, 6).join(', ') + (doubtful.length > 6 ? ' and more' : '');
+function reservations({unknown, at_rest: atRest, doubtful_rows: doubtful}) {
+  const rows = doubtful.slice(0, 6).join(', ') + (doubtful.length > 6 ? ' and more' : '');
   return sentences(
       unknown && `${counted(unknown, 'row')} left out, whose speed or diameter is not known.`,
       atRest && `${counted(atRest, 'row')} left out, whose motor stood.`,
-      lines && `In doubt, being far off the rest of their group: lines ${lines}.`);
+      rows && `In doubt, being far off the rest of their group: ${rows}.`);
 }
 
 function drawSweeps(section, chosen) {

@@ -5,6 +5,7 @@
 #include "support/seeds.h"
 #include "support/temporary_folder.h"
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -34,6 +35,7 @@ struct ExplainProgram : testing::Test {
   std::mt19937_64 random{test::seed()};
 
   std::function<int(int session)> first_hour = [](int) { return 8; };
+  std::array<const char*, 3> locations = {"OT", "H1V1", "H2V0"};  // in turn
 
   double normal(double sigma) { return std::normal_distribution<double>(0, sigma)(random); }
 
@@ -52,11 +54,10 @@ struct ExplainProgram : testing::Test {
         run.supply_voltage_V = 16 + std::uniform_real_distribution<double>(-0.5, 0.5)(random);
         change(run);
         const double density = 293.15 / (run.air_temperature_C + 273.15);
-        const char* location[] = {"OT", "H1V1", "H2V0"};
         campaign.runs_csv +=
             fmt::format("R{:03},{},{},S{:02},2026-03-{:02}T{:02}:00:00Z,,5000,{:.2f},{:.4f}{}", number + 1,
-                        location[i % 3], number / 3 + 1, session + 1, session + 1, run.hour,
-                        run.air_temperature_C, run.supply_voltage_V, run.extra);
+                        locations[static_cast<std::size_t>(i % 3)], number / 3 + 1, session + 1, session + 1,
+                        run.hour, run.air_temperature_C, run.supply_voltage_V, run.extra);
         for (int rotor = 0; rotor < 4; ++rotor)
           campaign.runs_csv += fmt::format(",{:.5f}", 7 * density * run.thrust_factor *
                                                           (rotor == 0 ? run.first_rotor_factor : 1) *
@@ -196,6 +197,26 @@ TEST_F(ExplainProgram, AFewSessionsAreInsufficient) {
   }
 }
 
+TEST_F(ExplainProgram, ALabelSaysHowFarTheGroundIs) {
+  locations = {"OS", "GND1", "GND2"};
+  write_campaign(10, "", [](SimulatedRun& run) {
+    const double height_R = run.number % 3;
+    if (height_R > 0) run.thrust_factor = 1 / (1 - std::pow(4 * height_R, -2));
+  });
+  import_campaign();
+  const json e = explained("--baseline open_space");
+  EXPECT_EQ(e["verdict"], "explained");
+  ASSERT_EQ(e["adopted"].size(), 1u);
+  EXPECT_EQ(e["adopted"][0]["effect"], "ground_effect");
+
+  locations = {"OT", "H1V1", "H2V0"};
+  write_campaign(10, "", sag);
+  import_campaign();
+  const ProgramResult refused = run("explain --db c.db --baseline open_space");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.error, HasSubstr("no run stands at OS"));
+}
+
 TEST_F(ExplainProgram, AMissingCovariateIsWarnedOfAndUntestable) {
   write_campaign(10, ",relative_humidity", [&](SimulatedRun& run) {
     run.extra = run.number % 10 == 3 ? "," : fmt::format(",{:.3f}", 0.3 + 0.004 * (run.number * 37 % 100));
@@ -205,7 +226,8 @@ TEST_F(ExplainProgram, AMissingCovariateIsWarnedOfAndUntestable) {
   const json entry = untestable(e, "air_humidity");
   ASSERT_FALSE(entry.is_null());
   EXPECT_THAT(entry["reason"].get<std::string>(), HasSubstr("relative_humidity is missing in 9 of 90 runs"));
-  EXPECT_THAT(warnings, HasSubstr("relative_humidity"));
+  EXPECT_THAT(warnings,
+              HasSubstr("relative_humidity is missing in 9 of 90 runs: what goes with it cannot be seen"));
   EXPECT_EQ(e["runs"], 90) << "no row is dropped";
 }
 
@@ -359,6 +381,15 @@ TEST_F(ExplainTable, BaselinesAreColumns) {
   EXPECT_EQ(explained("--baseline linear:V")["unit"], "N");
   EXPECT_EQ(run("explain --db c.db --baseline power:nosuch").code, 2);
   EXPECT_EQ(run("explain --db c.db --baseline cubic:V").code, 2);
+}
+
+TEST_F(ExplainTable, ARowOfTheOtherSignHasNoPower) {
+  int row = 0;
+  write_table([&row](double force) { return fmt::format("{}", row++ == 4 ? -force : force); });
+  ASSERT_EQ(import_table().code, 0);
+  const ProgramResult refused = run("explain --db c.db --baseline power:V");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.error, HasSubstr("t.csv:6: --baseline power:V: the response must have one sign"));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
@@ -10,14 +11,10 @@ namespace tunnelrig {
 namespace {
 
 using nlohmann::json;
+using test::explained;
+using test::quick;
 using testing::Contains;
 using testing::HasSubstr;
-
-SearchSettings quick() {
-  SearchSettings settings;
-  settings.simulations = 199;
-  return settings;
-}
 
 struct ExplainTest : testing::Test {
   std::mt19937_64 random{test::seed()};
@@ -33,7 +30,6 @@ struct ExplainTest : testing::Test {
     test::add_covariate(o, "tunnel_airspeed_m_s", 0, 0.4, random);
     return o;
   }
-  static Explanation explained(const Observations& o) { return explain(o, test::every_effect(), quick()); }
 };
 
 void expect_finite(const json& value, const std::string& path) {
@@ -41,7 +37,7 @@ void expect_finite(const json& value, const std::string& path) {
     EXPECT_TRUE(std::isfinite(value.get<double>())) << path;
   }
   if (value.is_object() || value.is_array())
-    for (const auto& [key, inner] : value.items()) expect_finite(inner, path + "/" + key);
+    for (const auto& [key, inner] : value.items()) expect_finite(inner, fmt::format("{}/{}", path, key));
 }
 
 /// Field names are a contract.

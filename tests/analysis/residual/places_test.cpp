@@ -13,6 +13,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test::explained;
 
 struct Places : testing::Test {
   std::mt19937_64 random{test::seed()};
@@ -38,12 +39,6 @@ struct Places : testing::Test {
 
   static VectorXd volts(const Observations& o) {
     return o.find("supply_voltage_V")->value.col(0).array() - 16;
-  }
-
-  static Explanation explained(const Observations& o) {
-    SearchSettings settings;
-    settings.simulations = 199;
-    return explain(o, test::every_effect(), settings);
   }
 };
 

@@ -13,6 +13,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test::explained;
 
 constexpr double kRunSigma = 0.002;
 
@@ -37,12 +38,6 @@ struct Scatter : testing::Test {
   }
 
   VectorXd found(const Observations& o) { return rotor_scatter(o, o.all_rows(), {o.y}, random); }
-
-  static Explanation explained(const Observations& o) {
-    SearchSettings settings;
-    settings.simulations = 199;
-    return explain(o, test::every_effect(), settings);
-  }
 };
 
 /// Own scatters and a part that is the same in all: the modes are uncorrelated, the differences alike.

@@ -90,6 +90,16 @@ std::vector<const Effect*> every_effect() {
   return result;
 }
 
+SearchSettings quick() {
+  SearchSettings settings;
+  settings.simulations = 199;
+  return settings;
+}
+
+Explanation explained(const Observations& observations) {
+  return explain(observations, every_effect(), quick());
+}
+
 MatrixXd dense_covariance(const Observations& observations, const std::vector<int>& rows, double ratio,
                           double run_correlation) {
   const auto n = static_cast<Index>(rows.size());

@@ -106,7 +106,7 @@ TEST_F(Statistics, NullCampaignsOfFourRotorsAreRarelyNamed) {
   int named = 0;
   for (int i = 0; i < kCampaigns; ++i) {
     const Observations o = campaign(0.4 * (i % 4), 4, 0);
-    settings.seed = static_cast<std::uint64_t>(i + 1);
+    settings.seed = static_cast<std::uint64_t>(i) + 1;
     const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
     named += found.accepted.empty() ? 0 : 1;
   }
@@ -126,7 +126,7 @@ TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
     for (Eigen::Index row = 0; row < o.rows(); ++row)
       slow.value(row, 0) = std::sin(0.5 * static_cast<double>(row));
     o.covariates.push_back(std::move(slow));
-    settings.seed = static_cast<std::uint64_t>(i + 1);
+    settings.seed = static_cast<std::uint64_t>(i) + 1;
     const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
     said += found.accepted.empty() && found.curves.empty() ? 0 : 1;
     seen += found.observations.scatter.run_correlation[1] > 0.4 ? 1 : 0;
@@ -148,7 +148,7 @@ TEST_F(Statistics, ARotorThatScattersMoreIsNoStructure) {
     MatrixXd y = o.y;
     for (double& value : y.col(i % 4)) value += more(random);
     test::set_y(o, y);
-    settings.seed = static_cast<std::uint64_t>(i + 1);
+    settings.seed = static_cast<std::uint64_t>(i) + 1;
     const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
     said += found.accepted.empty() && found.curves.empty() ? 0 : 1;
   }

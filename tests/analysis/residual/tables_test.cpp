@@ -1,12 +1,12 @@
 // Tables as others bring them: gross rows, a cell's volts, groups that differ, steps and trends.
+#include "analysis/residual/tables.h"
+
 #include "analysis/residual/curves.h"
 #include "analysis/residual/explanation_output.h"
-#include "analysis/residual/explanation_parts.h"
-#include "analysis/residual/simulated.h"
 #include "support/message_of.h"
-#include "support/seeds.h"
 
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -15,46 +15,11 @@
 namespace tunnelrig {
 namespace {
 
+using test::explained;
+using test::kMiddle_V;
+using test::TablesTest;
 using testing::Contains;
 using testing::HasSubstr;
-
-constexpr double kMiddle_V = 11.5;
-
-struct TablesTest : testing::Test {
-  std::mt19937_64 random{test::seed()};
-  std::normal_distribution<double> scatter;
-  std::uniform_real_distribution<double> even{0, 1};
-
-  static Observations observed(const std::string& csv, const std::string& schema) {
-    return observe_table(
-        read_observations(parse_csv(csv, "t.csv"),
-                          parse_table_schema("format = \"tunnelrig-table/1\"\n" + schema, "s.toml")),
-        {});
-  }
-  static Explanation explained(const Observations& o) {
-    SearchSettings settings;
-    settings.simulations = 199;
-    return explain(o, test::every_effect(), settings);
-  }
-  static std::string names(const Explanation& e) {
-    std::string all;
-    for (const AdoptedEffect& adopted : e.adopted) all += adopted.term.effect->name + " ";
-    return all;
-  }
-
-  /// Thrust by voltage, 96 rows in 12 blocks of 0.3 %; `wrong` multiplies the row on line 24.
-  Observations thrusts(double wrong) {
-    std::string csv = "b,V,y\n";
-    for (int r = 0; r < 96; ++r) {
-      const double volts = 10.5 + 2 * even(random);
-      const double force_N = 8 * std::pow(volts / kMiddle_V, 1.7) * (1 + 0.003 * scatter(random));
-      csv += fmt::format("{},{},{}\n", r / 8, volts, r == 22 ? wrong * force_N : force_N);
-    }
-    return observed(csv,
-                    "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
-                    "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n");
-  }
-};
 
 TEST_F(TablesTest, ARowTenTimesTooLargeIsSetAside) {
   const Observations o = thrusts(10);
@@ -75,6 +40,45 @@ TEST_F(TablesTest, RowsOffByATenthAreAsFarOffEitherWay) {
     ASSERT_FALSE(e.suspect_rows.empty()) << wrong;
     EXPECT_EQ(e.suspect_rows[0].row, "t.csv:24");
     EXPECT_NEAR(e.suspect_rows[0].studentised, (wrong > 1 ? 1 : -1) * 0.1 / 0.003, 20) << wrong;
+  }
+}
+
+/// What is straight in a curve over the baseline's own column is the baseline's: only the bend is drawn.
+TEST_F(TablesTest, ACurveOverTheBaselinesColumnIsItsBend) {
+  constexpr double kBend = 0.03;
+  std::string csv = "b,x,y\n";
+  for (int r = 0; r < 96; ++r) {
+    const double along = even(random);  // of log x, 2 to 8
+    const double x = 2 * std::pow(4, along);
+    const double bend = kBend * std::cos(2 * std::numbers::pi * along);
+    csv += fmt::format("{},{},{}\n", r / 8, x, 10 * std::pow(x, 1.4) * (1 + bend + 0.003 * scatter(random)));
+  }
+  const std::string schema =
+      "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"W\"\nscatter = \"relative\"\n"
+      "[[covariates]]\ncolumn = \"x\"\nunit = \"1\"\n";
+  const Observations o = observed(csv, schema, "power:x");
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.unknown.size(), 1u);
+  EXPECT_EQ(e.unknown[0].covariate, "x");
+  EXPECT_NEAR(e.unknown[0].amplitude / (kBend * o.value.mean()), 1, 0.3);
+}
+
+/// A bend of the power law itself, which a cell's characteristic follows for a part of the way.
+TEST_F(TablesTest, ABendOfThePowerLawIsNoNonlinearity) {
+  for (const bool of_the_cell : {false, true}) {
+    std::string csv = "b,rpm,y\n";
+    for (int r = 0; r < 160; ++r) {
+      const double along = std::fmod(0.618 * r, 1), force = std::pow(4, 1.4 * along);
+      const double bend = of_the_cell ? 0.02 * force : 0.03 * std::cos(2 * std::numbers::pi * along);
+      csv += fmt::format("{},{},{}\n", r / 10, 2 * std::pow(4, along),
+                         10 * force * (1 + bend + 0.01 * scatter(random)));
+    }
+    const Explanation e = explained(observed(csv,
+                                             "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+                                             "[[covariates]]\ncolumn = \"rpm\"\nunit = \"1\"\n",
+                                             "power:rpm"));
+    EXPECT_EQ(names(e), of_the_cell ? "nonlinearity " : "");
+    EXPECT_EQ(e.unknown.size(), of_the_cell ? 0u : 1u);
   }
 }
 
@@ -121,44 +125,6 @@ TEST_F(TablesTest, ZeroAndSpanDriftAreBothFound) {
   EXPECT_TRUE(std::none_of(e.adopted.begin(), e.adopted.end(), [](const AdoptedEffect& adopted) {
     return adopted.term.effect->name == "temperature_gradient";
   })) << "nobody recorded the air's temperature";
-}
-
-TEST_F(TablesTest, GroupsWithExponentsOfTheirOwnAreTold) {
-  std::string csv = "p,V,y\n";
-  for (int r = 0; r < 80; ++r) {
-    const double volts = 10.5 + 2 * even(random), exponent = r % 2 == 0 ? 1.4 : 2.0;
-    csv += fmt::format("p{},{},{}\n", r % 2, volts,
-                       (5 + r % 2) * std::pow(volts / kMiddle_V, exponent) * (1 + 0.002 * scatter(random)));
-  }
-  const Observations o =
-      observed(csv,
-               "groups = [\"p\"]\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
-               "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n");
-  const Explanation e = explained(o);
-  ASSERT_EQ(names(e), "supply_voltage ");
-  const ParameterEstimate& exponent = e.adopted[0].parameters[0];
-  ASSERT_EQ(exponent.groups.size(), 2u);
-  EXPECT_EQ(exponent.groups[0].group, "p0");
-  EXPECT_NEAR(exponent.groups[0].value, 1.4, 0.05);
-  EXPECT_NEAR(exponent.groups[1].value, 2.0, 0.05);
-  EXPECT_NEAR(exponent.value, 1.7, 0.05);
-  EXPECT_LT(exponent.low, exponent.groups[0].value);
-  EXPECT_GT(exponent.high, exponent.groups[1].value);
-  EXPECT_EQ(
-      nlohmann::json::parse(explanation_json(e))["adopted"][0]["parameters"]["exponent"]["groups"].size(),
-      2u);
-  // The page draws what each group has: the line through the points, not the median's and not none.
-  const std::string html = explanation_html(e, o, {}, {}),
-                    start = R"(<script type="application/json" id="data">)";
-  const std::size_t from = html.find(start) + start.size();
-  const auto panel =
-      nlohmann::json::parse(html.substr(from, html.find("</script>", from) - from))["panels"][0];
-  double fitted2 = 0, after2 = 0;
-  for (std::size_t i = 0; i < panel["x"].size(); ++i) {
-    fitted2 += std::pow(panel["fitted"][i].get<double>(), 2);
-    after2 += std::pow(panel["after"][i].get<double>(), 2);
-  }
-  EXPECT_GT(fitted2, 100 * after2);
 }
 
 /// Rows that drift by themselves, each taken as a block.

@@ -153,16 +153,17 @@ TEST(Terms, RegressorsSeeMeasuredForcesThroughTheGroupsConstantOnly) {
   Observations o = test::simulate({.channels = 2}, random);
   add_every_covariate(o, random);
   const auto rows = o.all_rows();
-  // Two runs of one group, apart from each other, move in opposite ways: the group's constant stays.
+  // Two runs of one group, apart from each other, change places: the group's constant stays, and its scatter,
+  // by which the sign of a difference is more or less sure.
   const auto group = [&](int row) { return o.group[static_cast<std::size_t>(row)]; };
   int first = 5, second = first + 10;
   while (group(second) != group(first)) ++second;
-  Observations changed = o;
   MatrixXd y = o.y;
-  y(first, 0) += 0.05;
-  y(second, 0) -= 0.05;
-  y(first, 1) -= 0.02;
-  y(second, 1) += 0.02;
+  y.row(first) << y(first, 0) + 0.05, y(first, 1) - 0.02;
+  y.row(second) << y(second, 0) - 0.05, y(second, 1) + 0.02;
+  test::set_y(o, y);
+  Observations changed = o;
+  y.row(first).swap(y.row(second));
   test::set_y(changed, y);
   ASSERT_GT((changed.value - o.value).norm(), 0.1);
   const MatrixXd predicted = predict_response(o, {}, rows),
@@ -207,17 +208,56 @@ TEST(Terms, SayWhatIsMissing) {
   EXPECT_THAT(testability(test::effect_named("wake_recirculation"), o).reason, testing::HasSubstr("tunnel"));
 }
 
+/// Locations that differ, or a speed that does: without either the run before has no force of its own.
 TEST(Terms, TheRunBeforeIsNoRegressorWhereAllForcesAreOne) {
   std::mt19937_64 random(test::seed() + 8);
-  for (const bool different : {false, true}) {
-    Observations o = test::simulate({.groups = 12, .channels = 4}, random);
-    add_every_covariate(o, random);
-    if (!different)
-      for (Eigen::Index row = 0; row < o.rows(); ++row)
-        o.y.row(row).array() -= 0.01 * o.group[static_cast<std::size_t>(row)];
-    for (const char* effect : {"hysteresis", "creep_recovery"})
-      EXPECT_EQ(testability(test::effect_named(effect), o).ok(), different) << effect;
-  }
+  for (const bool locations : {false, true})
+    for (const bool speeds : {false, true}) {
+      Observations o = test::simulate({.groups = 12, .channels = 4}, random);
+      add_every_covariate(o, random);
+      const auto speed = std::ranges::find(o.covariates, "speed_rpm", &Covariate::name);
+      for (Eigen::Index row = 0; row < o.rows(); ++row) {
+        const double ratio = speeds && row % 3 == 0 ? 0.7 : 1;
+        speed->value.row(row).setConstant(ratio * o.rig.nominal_speed_rpm);
+        o.y.row(row).array() += 2 * std::log(ratio);
+        if (!locations) o.y.row(row).array() -= 0.01 * o.group[static_cast<std::size_t>(row)];
+      }
+      for (const char* effect : {"hysteresis", "creep_recovery"})
+        EXPECT_EQ(testability(test::effect_named(effect), o).ok(), locations || speeds) << effect;
+    }
+}
+
+/// Hysteresis is no part of the force that the next run remembers: where the same run is repeated, the sign
+/// of the difference would be that of the hysteresis.
+TEST(Terms, WhatTheRunBeforeDidIsNoForce) {
+  std::mt19937_64 random(test::seed() + 9);
+  const Observations o = test::simulate({.groups = 12, .channels = 4}, random);
+  const Term term{.effect = &test::effect_named("hysteresis"), .parameters = {0.01}};
+  const std::vector<int> rows = o.all_rows();
+  const MatrixXd forces = predict_response(o, {{term}, {}}, rows);
+  EXPECT_GT(respond(term, o, forces).value[0].norm(), 0);
+  for (Eigen::Index row = 1; row < o.rows(); ++row)
+    if (o.group[static_cast<std::size_t>(row)] == o.group[0]) {
+      EXPECT_NEAR(forces(row, 0) / o.known(row, 0), forces(0, 0) / o.known(0, 0), 1e-12);
+    }
+}
+
+/// Which of two runs at one place had more force is the weather's to say, unless the speed made them differ.
+TEST(Terms, ARunRepeatedAtItsPlaceHasNoSign) {
+  std::mt19937_64 random(test::seed() + 10);
+  Observations o = test::simulate({.groups = 12, .channels = 4}, random);
+  const Term term{.effect = &test::effect_named("hysteresis"), .parameters = {0.01}};
+  MatrixXd forces = o.value;
+  o.group[2] = o.group[1];
+  o.previous[2] = 1;
+  const auto change = [&] { return respond(term, o, forces).value[0].row(2).cwiseAbs().maxCoeff(); };
+  forces.row(2) = 1.002 * forces.row(1);
+  EXPECT_NEAR(change(), 0, 1e-12);
+  forces.row(2) = 1.2 * forces.row(1);
+  EXPECT_NEAR(change(), 0.01, 1e-4);
+  o.group[2] = o.group[1] + 1;
+  forces.row(2) = 1.002 * forces.row(1);
+  EXPECT_NEAR(change(), 0.01, 1e-4);
 }
 
 }  // namespace

@@ -1,0 +1,147 @@
+// Groups of a table: amplitudes and lines of their own, and what is the same in all rows of one.
+#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/tables.h"
+
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+namespace tunnelrig {
+namespace {
+
+using test::explained;
+using test::kMiddle_V;
+using test::TablesTest;
+using testing::HasSubstr;
+
+/// Six cells in the same weather, of which one drifts up and another down: nothing that all have in common.
+TEST_F(TablesTest, DriftsOfEitherSignAreFoundInEachGroup) {
+  constexpr std::array<double, 6> kDrift_V_K = {2e-6, -1.5e-6, 0.6e-6, -1.8e-6, 1.4e-6, -0.7e-6};
+  for (const double share : {0.0, 1.0}) {
+    std::string csv = "cell,day,T,u\n";
+    for (int day = 0; day < 20; ++day) {
+      const double temperature = 20 + 6 * scatter(random);
+      for (std::size_t cell = 0; cell < kDrift_V_K.size(); ++cell) {
+        const double own = temperature + scatter(random);
+        csv += fmt::format("{},{},{},{}\n", cell, day, own,
+                           2e-3 + share * kDrift_V_K[cell] * (own - 20) + 3e-6 * scatter(random));
+      }
+    }
+    const Explanation e = explained(
+        observed(csv,
+                 "groups = [\"cell\"]\nblocks = \"day\"\n[response]\ncolumn = \"u\"\nunit = \"V\"\n"
+                 "[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\nmeaning = \"cell_temperature_C\"\n"));
+    if (share == 0) {
+      EXPECT_EQ(names(e), "");
+      continue;
+    }
+    // At one load a drift of the span is the same.
+    ASSERT_EQ(e.adopted.size(), 1u) << names(e);
+    EXPECT_TRUE(e.adopted[0].term.per_group);
+    const std::string& name = e.adopted[0].term.effect->name;
+    const std::string both = name + " " + testing::PrintToString(e.adopted[0].confounded_with);
+    EXPECT_THAT(both, HasSubstr("zero_drift_temperature"));
+    EXPECT_THAT(both, HasSubstr("span_drift_temperature"));
+    const double scale = name == "zero_drift_temperature" ? 1 : 2e-3;
+    const auto& groups = e.adopted[0].parameters[0].groups;
+    ASSERT_EQ(groups.size(), kDrift_V_K.size());
+    for (std::size_t cell = 0; cell < groups.size(); ++cell)
+      EXPECT_NEAR(groups[cell].value * scale, kDrift_V_K[cell], 0.4e-6);
+    EXPECT_LT(e.after.held_out_rmse, 0.6 * e.before.held_out_rmse);
+  }
+}
+
+TEST_F(TablesTest, GroupsWithExponentsOfTheirOwnAreTold) {
+  std::string csv = "p,V,y\n";
+  for (int r = 0; r < 80; ++r) {
+    const double volts = 10.5 + 2 * even(random), exponent = r % 2 == 0 ? 1.4 : 2.0;
+    csv += fmt::format("p{},{},{}\n", r % 2, volts,
+                       (5 + r % 2) * std::pow(volts / kMiddle_V, exponent) * (1 + 0.002 * scatter(random)));
+  }
+  const Observations o =
+      observed(csv,
+               "groups = [\"p\"]\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+               "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n");
+  const Explanation e = explained(o);
+  ASSERT_EQ(names(e), "supply_voltage ");
+  const ParameterEstimate& exponent = e.adopted[0].parameters[0];
+  ASSERT_EQ(exponent.groups.size(), 2u);
+  EXPECT_EQ(exponent.groups[0].group, "p0");
+  EXPECT_NEAR(exponent.groups[0].value, 1.4, 0.05);
+  EXPECT_NEAR(exponent.groups[1].value, 2.0, 0.05);
+  EXPECT_NEAR(exponent.value, 1.7, 0.05);
+  EXPECT_LT(exponent.low, exponent.groups[0].value);
+  EXPECT_GT(exponent.high, exponent.groups[1].value);
+  EXPECT_EQ(
+      nlohmann::json::parse(explanation_json(e))["adopted"][0]["parameters"]["exponent"]["groups"].size(),
+      2u);
+  // The page draws what each group has: the line through the points, not the median's and not none.
+  const std::string html = explanation_html(e, o, {}, {}),
+                    start = R"(<script type="application/json" id="data">)";
+  const std::size_t from = html.find(start) + start.size();
+  const auto panel =
+      nlohmann::json::parse(html.substr(from, html.find("</script>", from) - from))["panels"][0];
+  double fitted2 = 0, after2 = 0;
+  for (std::size_t i = 0; i < panel["x"].size(); ++i) {
+    fitted2 += std::pow(panel["fitted"][i].get<double>(), 2);
+    after2 += std::pow(panel["after"][i].get<double>(), 2);
+  }
+  EXPECT_GT(fitted2, 100 * after2);
+}
+
+/// Lines of 24 groups, which are the blocks too: of a held-out group the slope is as unknown as the constant.
+TEST_F(TablesTest, HeldOutGroupsHaveSlopesOfTheirOwn) {
+  std::string csv = "g,x,y\n";
+  for (int group = 0; group < 24; ++group) {
+    const double slope = 1 + even(random);
+    for (int r = 0; r < 10; ++r) {
+      const double x = r + even(random);
+      csv += fmt::format("{},{},{}\n", group, x, group + slope * x + 0.05 * scatter(random));
+    }
+  }
+  const Explanation e = explained(observed(
+      csv, "groups = [\"g\"]\nblocks = \"g\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n", "linear:x"));
+  EXPECT_EQ(names(e), "");
+  EXPECT_LT(e.before.held_out_rmse, 2 * e.noise_floor);
+  EXPECT_LT(e.noise_floor, 0.1);
+}
+
+/// Far from the ground nobody writes a distance.
+TEST_F(TablesTest, AnEmptyDistanceIsNoEffect) {
+  std::string csv = "b,z,y\n";
+  for (int r = 0; r < 90; ++r) {
+    const double z = 1 + r % 3;
+    const bool far = r % 3 == 2;
+    const double force = far ? 5 : 5 / (1 - std::pow(4 * z, -2));
+    csv += fmt::format("{},{},{}\n", r / 6, far ? "" : fmt::format("{}", z),
+                       force * (1 + 0.002 * scatter(random)));
+  }
+  const Explanation e =
+      explained(observed(csv,
+                         "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+                         "[[covariates]]\ncolumn = \"z\"\nunit = \"1\"\nmeaning = \"ground_distance_R\"\n"));
+  EXPECT_EQ(names(e), "ground_effect ");
+}
+
+/// Creep under one load changes the force by itself, of which no second effect is to be read off.
+TEST_F(TablesTest, WhatOneForceCannotShowIsNotTriedBesideAnother) {
+  std::string csv = "cycle,t,u\n";
+  for (int cycle = 0; cycle < 8; ++cycle)
+    for (int r = 0; r < 40; ++r) {
+      const double t = 10 * r + 1;
+      csv += fmt::format("{},{},{}\n", cycle, t,
+                         (6e6 + 1e4 * cycle) * (1 + 0.005 * (1 - std::exp(-t / 75))) + 900 * scatter(random));
+    }
+  const Explanation e = explained(
+      observed(csv,
+               "groups = [\"cycle\"]\n[response]\ncolumn = \"u\"\nunit = \"counts\"\n"
+               "[[covariates]]\ncolumn = \"t\"\nunit = \"s\"\nmeaning = \"time_since_motor_start_s\"\n"));
+  EXPECT_THAT(names(e), testing::Not(HasSubstr("nonlinearity")));
+  EXPECT_THAT(names(e), HasSubstr("creep"));
+}
+
+}  // namespace
+}  // namespace tunnelrig
