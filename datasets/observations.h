@@ -21,6 +21,8 @@ struct TableColumn {
   std::string unit;
   std::string meaning;  // a name the suite knows ("speed_rpm", "air_temperature_C", …); empty: a covariate
                         // like any other
+
+  const std::string& name() const { return meaning.empty() ? column : meaning; }
 };
 
 inline constexpr std::string_view kTableFormat = "tunnelrig-table/1";

@@ -24,11 +24,6 @@ constexpr double kStep = 1e-4;        // of derivatives by parameters, in standa
 constexpr double kReadingStep = 1e-6;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// A location without ground or ceiling has no distance to it, and the effect is absent there.
-bool may_be_absent(const std::string& covariate) {
-  return covariate == "ground_distance_R" || covariate == "ceiling_distance_R";
-}
-
 /// T = e(F) for all rotors of a run at once, and back.
 class Forward {
  public:

@@ -41,11 +41,8 @@ void Search::begin() {
   observations_.scatter = std::move(scatter);
   make_models();
   ways_ = all_ways(effects_, observations_, rows_);
-  // What only another effect's changes of the force would show is no evidence of its own.
-  const Eigen::MatrixXd known = predict_response(observations_, {known_terms(observations_), {}}, rows_);
-  std::erase_if(ways_, [&](const Term& way) {
-    return !mixed_->sees(respond(way, observations_, known).derivative[0]);
-  });
+  const OwnEvidence has_evidence(observations_, *baseline_);
+  std::erase_if(ways_, [&](const Term& way) { return !has_evidence(way); });
   points_.clear();
   for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
   result_ = {};
@@ -58,6 +55,15 @@ void Search::begin() {
 void Search::make_models() {
   mixed_ = std::make_unique<MixedModel>(observations_, rows_);
   baseline_ = std::make_unique<MixedModel>(MixedModel::baseline_alone(observations_, rows_));
+}
+
+OwnEvidence::OwnEvidence(const Observations& observations, const MixedModel& baseline)
+    : observations_(observations),
+      baseline_(baseline),
+      predicted_(predict_response(observations, {known_terms(observations), {}}, baseline.rows())) {}
+
+bool OwnEvidence::operator()(const Term& way) const {
+  return baseline_.sees(respond(way, observations_, predicted_).derivative[0]);
 }
 
 std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,

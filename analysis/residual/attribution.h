@@ -68,6 +68,20 @@ struct Attribution {
 std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,
                            const std::vector<int>& rows);
 
+/// Whether a way would change the forces that the baseline and what is known predict, by more than the
+/// baseline can absorb. What only another effect's changes of the force would show is no evidence of its own.
+class OwnEvidence {
+ public:
+  /// Keeps references. `baseline`: alone, of the runs that count.
+  OwnEvidence(const Observations& observations, const MixedModel& baseline);
+  bool operator()(const Term& way) const;
+
+ private:
+  const Observations& observations_;
+  const MixedModel& baseline_;
+  Eigen::MatrixXd predicted_;
+};
+
 /// Standard errors that an effect must be of to reach an evidence four times in five: −log10 p of a two-sided
 /// normal deviate, and 0.84.
 double deviates(double evidence);

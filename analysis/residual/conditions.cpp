@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -16,7 +17,6 @@
 namespace tunnelrig {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
@@ -26,17 +26,15 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
                                            const std::vector<int>& rows) {
   std::map<std::string, std::vector<Untestable>> by_name;
   std::set<std::string> testable;
-  const MixedModel mixed = MixedModel::baseline_alone(observations, rows);
-  const MatrixXd predicted = predict_response(observations, {known_terms(observations), {}}, rows);
+  const MixedModel baseline = MixedModel::baseline_alone(observations, rows);
+  const OwnEvidence has_evidence(observations, baseline);
   for (const Effect* effect : effects) {
     const Testability can = testability(*effect, observations);
     std::string reason = can.reason;
     if (can.ok()) {
       const std::vector<Term> ways = ways_to_try(*effect, observations, rows);
       if (ways.empty()) reason = "there are too few blocks on both sides of any step";
-      const bool seen = std::any_of(ways.begin(), ways.end(), [&](const Term& way) {
-        return mixed.sees(respond(way, observations, predicted).derivative[0]);
-      });
+      const bool seen = std::any_of(ways.begin(), ways.end(), std::cref(has_evidence));
       if (!seen && reason.empty())
         reason = observations.from_table
                      ? "it does not vary within any group beside the baseline, which absorbs it"

@@ -196,34 +196,34 @@ MatrixXd along_slopes(const Observations& observations, const MatrixXd& residual
 
 MatrixXd predict_response(const Observations& observations, const MeanModel& model,
                           const std::vector<int>& rows) {
-  MatrixXd predicted = observations.value;  // only to begin with: replaced by the constants' prediction below
-  for (int pass = 0; pass < 2; ++pass) {
-    MatrixXd residual = observations.y;
-    MatrixXd added = MatrixXd::Zero(residual.rows(), residual.cols());
+  MatrixXd residual = observations.y;
+  MatrixXd added = MatrixXd::Zero(residual.rows(), residual.cols());
+  if (!model.terms.empty()) {
+    const MatrixXd nominal = predict_response(observations, {}, rows);
     for (const Term& term : model.terms) {
-      if (pass == 0) break;
-      const MatrixXd value = respond(term, observations, predicted).value[0];
+      const MatrixXd value = respond(term, observations, nominal).value[0];
       residual -= value;
       if (!term.effect->needs_previous) added += value;
     }
-    MatrixXd sum = MatrixXd::Zero(observations.groups(), residual.cols());
-    VectorXd count = VectorXd::Zero(observations.groups());
-    for (const int row : rows) {
-      sum.row(observations.group[static_cast<std::size_t>(row)]) += residual.row(row);
-      count(observations.group[static_cast<std::size_t>(row)]) += 1;
-    }
-    added += along_slopes(observations, residual, rows);
-    const Eigen::RowVectorXd overall = sum.colwise().sum() / count.sum();
-    for (Index row = 0; row < residual.rows(); ++row) {
-      const Index group = observations.group[static_cast<std::size_t>(row)];
-      Eigen::RowVectorXd constant =
-          count(group) > 0 ? Eigen::RowVectorXd(sum.row(group) / count(group)) : overall;
-      if (observations.is_line()) constant.setZero();
-      predicted.row(row) = observations.multiplicative
-                               ? Eigen::RowVectorXd(observations.known.row(row).array() *
-                                                    (constant + added.row(row)).array().exp())
-                               : Eigen::RowVectorXd(constant + added.row(row));
-    }
+  }
+  MatrixXd sum = MatrixXd::Zero(observations.groups(), residual.cols());
+  VectorXd count = VectorXd::Zero(observations.groups());
+  for (const int row : rows) {
+    sum.row(observations.group[static_cast<std::size_t>(row)]) += residual.row(row);
+    count(observations.group[static_cast<std::size_t>(row)]) += 1;
+  }
+  added += along_slopes(observations, residual, rows);
+  const Eigen::RowVectorXd overall = sum.colwise().sum() / count.sum();
+  MatrixXd predicted(residual.rows(), residual.cols());
+  for (Index row = 0; row < residual.rows(); ++row) {
+    const Index group = observations.group[static_cast<std::size_t>(row)];
+    Eigen::RowVectorXd constant =
+        count(group) > 0 ? Eigen::RowVectorXd(sum.row(group) / count(group)) : overall;
+    if (observations.is_line()) constant.setZero();
+    predicted.row(row) = observations.multiplicative
+                             ? Eigen::RowVectorXd(observations.known.row(row).array() *
+                                                  (constant + added.row(row)).array().exp())
+                             : Eigen::RowVectorXd(constant + added.row(row));
   }
   return predicted;
 }

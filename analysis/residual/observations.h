@@ -29,6 +29,14 @@ struct Covariate {
   double at(Eigen::Index run, Eigen::Index channel) const { return value(run, per_channel() ? channel : 0); }
 };
 
+inline constexpr std::string_view kGroundDistance = "ground_distance_R",
+                                  kCeilingDistance = "ceiling_distance_R";
+
+/// A place without ground or ceiling has no distance to it, and what depends on the distance is absent there.
+inline bool may_be_absent(std::string_view covariate) {
+  return covariate == kGroundDistance || covariate == kCeilingDistance;
+}
+
 /// A column of texts; an empty cell is a text as well.
 Covariate covariate_of_texts(const std::string& name, const std::vector<std::string>& texts);
 

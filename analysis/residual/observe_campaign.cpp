@@ -18,8 +18,6 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kOpenSpace = "open space";  // group of all its runs
-constexpr const char* kGround = "ground_distance_R";
-constexpr const char* kCeiling = "ceiling_distance_R";
 using Eigen::Index;
 using Eigen::MatrixXd;
 
@@ -87,15 +85,15 @@ void add_courses(const Source& source, Observations& result) {
 std::optional<double> condition(const Run& run, const std::string& name) {
   const auto value = run.number(name);
   if (value) return value;
-  if (name == kGround) return distance_of(run.location, "GND");
-  if (name == kCeiling) return distance_of(run.location, "CEIL");
+  if (name == kGroundDistance) return distance_of(run.location, "GND");
+  if (name == kCeilingDistance) return distance_of(run.location, "CEIL");
   return {};
 }
 
 void add_sheet_covariates(const Source& source, Observations& result) {
   static const std::set<std::string, std::less<>> kNotConditions = {
       "repeat", "thrust_1_N", "thrust_2_N", "thrust_3_N", "thrust_4_N", "y_norm", "z_norm"};
-  std::set<std::string> names = {kGround, kCeiling};
+  std::set<std::string> names = {std::string(kGroundDistance), std::string(kCeilingDistance)};
   for (Index row = 0; row < source.rows(); ++row)
     for (const auto& [name, value] : source.run(row).numbers)
       if (!kNotConditions.contains(name)) names.insert(name);
@@ -106,9 +104,8 @@ void add_sheet_covariates(const Source& source, Observations& result) {
       const auto value = condition(source.run(row), name);
       value ? covariate.value(row, 0) = *value : static_cast<double>(++missing);
     }
-    const bool may_be_absent = name == kGround || name == kCeiling;
-    if (may_be_absent && missing == source.rows()) continue;
-    if (missing > 0 && !may_be_absent)
+    if (may_be_absent(name) && missing == source.rows()) continue;
+    if (missing > 0 && !may_be_absent(name))
       result.not_usable[name] = fmt::format("missing in {} of {} runs", missing, source.rows());
     result.covariates.push_back(std::move(covariate));
   }

@@ -78,7 +78,7 @@ void add_covariates(const Source& source, Observations& result) {
       if (std::isnan(covariate.value(r, 0))) ++missing;
     }
     if (missing == source.count()) return;
-    if (missing > 0 && name != "ground_distance_R" && name != "ceiling_distance_R")
+    if (missing > 0 && !may_be_absent(name))
       result.not_usable[name] = fmt::format("missing in {} of {} rows", missing, source.count());
     result.covariates.push_back(std::move(covariate));
   };
@@ -86,7 +86,7 @@ void add_covariates(const Source& source, Observations& result) {
     if (column.unit == kTextUnit)
       result.covariates.push_back(covariate_of_texts(column.column, source.texts(column.column)));
     else if (column.column != result.response)  // which would explain itself
-      add(column.meaning.empty() ? column.column : column.meaning, unit_after_conversion(column.unit),
+      add(column.name(), unit_after_conversion(column.unit),
           [&](Index r) { return source.converted(r, column); });
   if (schema.diameter_column || schema.diameter_m)
     add(
@@ -284,7 +284,7 @@ void set_other_axes(const TableSchema& schema, const std::string& baseline, Obse
   for (const TableColumn& column : schema.covariates)
     if (column.column != baseline && column.column != result.response && !quantity.empty() &&
         unit_from_name(column.unit).quantity == quantity)
-      result.other_axes.push_back(column.meaning.empty() ? column.column : column.meaning);
+      result.other_axes.push_back(column.name());
 }
 
 /// Whether each group that the fit can see lies within one block.
@@ -302,7 +302,7 @@ void set_groups_within_blocks(Observations& result) {
 /// wrong. Returns its name there.
 std::string keep_as_covariate(const Source& source, const std::string& column, Observations& result) {
   for (const TableColumn& each : source.table.schema.covariates)
-    if (each.column == column) return each.meaning.empty() ? column : each.meaning;
+    if (each.column == column) return each.name();
   Covariate covariate{column, MatrixXd(source.count(), 1)};
   for (Index r = 0; r < source.count(); ++r) covariate.value(r, 0) = source.cell(r, column);
   if (result.find(column) == nullptr) result.covariates.push_back(std::move(covariate));

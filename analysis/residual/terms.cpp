@@ -34,6 +34,22 @@ const MatrixXd& cosines() {
   return table;
 }
 
+/// In the scale of y.
+MatrixXd scaled(const Observations& observations, const MatrixXd& predicted) {
+  return observations.multiplicative ? MatrixXd((predicted.array() / observations.known.array()).log())
+                                     : predicted;
+}
+
+/// n × c, in y's scale: of the error of the constant of each run's group, by what is left beside `predicted`.
+MatrixXd variance_of_constants(const Observations& observations, const MatrixXd& predicted) {
+  const double free = static_cast<double>(observations.rows() - observations.groups());
+  const Eigen::RowVectorXd variance =
+      (observations.y - scaled(observations, predicted)).colwise().squaredNorm() / std::max(free, 1.0);
+  VectorXd count = VectorXd::Zero(observations.groups());
+  for (const int group : observations.group) count(group) += 1;
+  return count(observations.group).cwiseInverse() * variance;
+}
+
 class Evaluation {
  public:
   Evaluation(const Term& term, const Observations& observations, const MatrixXd& predicted)
@@ -49,7 +65,7 @@ class Evaluation {
         parameters_[k].v[static_cast<Index>(k)] = 1;
     }
     within_ = term.effect->within_time() && !observations.shape.empty();
-    if (term.effect->needs_previous) set_errors();
+    if (term.effect->needs_previous) constant_variance_ = variance_of_constants(observations, predicted);
   }
 
   bool applies(Index row, Index channel) const {
@@ -93,6 +109,11 @@ class Evaluation {
             .rig = &observations_.rig};
   }
 
+  bool at_the_same_place(Index row, int other) const {
+    return observations_.group[static_cast<std::size_t>(row)] ==
+           observations_.group[static_cast<std::size_t>(other)];
+  }
+
   /// Of the run before; this run's own where that was nearly the same at the same place: which of the two was
   /// larger depends on what the model does not have.
   double previous_force(Index row, Index channel) const {
@@ -100,32 +121,15 @@ class Evaluation {
     const int before = observations_.previous[static_cast<std::size_t>(row)];
     if (before < 0) return std::numeric_limits<double>::quiet_NaN();
     const double own = force_of(row, channel), previous = force_of(before, channel);
-    const bool repeated = observations_.group[static_cast<std::size_t>(before)] ==
-                          observations_.group[static_cast<std::size_t>(row)];
-    return repeated && std::abs(previous - own) < kSame * std::abs(own) ? own : previous;
-  }
-
-  /// Of the groups' constants, by what is left beside the prediction.
-  void set_errors() {
-    const MatrixXd fitted = observations_.multiplicative
-                                ? MatrixXd((predicted_.array() / observations_.known.array()).log())
-                                : predicted_;
-    const double free =
-        std::max<double>(1, static_cast<double>(observations_.rows() - observations_.groups()));
-    const Eigen::RowVectorXd variance = (observations_.y - fitted).colwise().squaredNorm() / free;
-    VectorXd count = VectorXd::Zero(observations_.groups());
-    for (const int group : observations_.group) count(group) += 1;
-    constant_variance_ = count.cwiseMax(1).cwiseInverse() * variance;
+    const bool same = at_the_same_place(row, before) && std::abs(previous - own) < kSame * std::abs(own);
+    return same ? own : previous;
   }
 
   /// Of the difference between the forces of this run and the one before it.
   double previous_error(Index row, Index channel) const {
     const int before = observations_.previous[static_cast<std::size_t>(row)];
-    if (constant_variance_.size() == 0 || before < 0) return 0;
-    const int own = observations_.group[static_cast<std::size_t>(row)],
-              other = observations_.group[static_cast<std::size_t>(before)];
-    if (own == other) return 0;
-    const double error = std::sqrt(constant_variance_(own, channel) + constant_variance_(other, channel));
+    if (constant_variance_.size() == 0 || before < 0 || at_the_same_place(row, before)) return 0;
+    const double error = std::sqrt(constant_variance_(row, channel) + constant_variance_(before, channel));
     return observations_.multiplicative ? error * std::abs(force_of(row, channel)) : error;
   }
 
@@ -150,7 +154,7 @@ class Evaluation {
   std::vector<const Covariate*> covariates_;
   std::vector<double> x_;
   EffectJet parameters_[kMaxEffectParameters];
-  MatrixXd constant_variance_;  // groups × c; of effects of the run before
+  MatrixXd constant_variance_;  // n × c; of effects of the run before
   bool within_ = false;
 };
 
@@ -174,38 +178,14 @@ std::vector<double> change_points(const Observations& observations, const std::v
 /// depends on the force of the run before would otherwise depend on that run's scatter, of which its group's
 /// constant has a part; all the more where a run's scatter goes with that of the run before.
 bool forces_differ(const Observations& observations) {
+  if (observations.rows() <= observations.groups()) return true;
   const bool correlated = observations.scatter.run_correlation != std::array<double, 2>{0, 0};
   const double least = correlated ? 40 : 3;  // variance over that of the constants' errors
-  double variance = 0, noise = 0;
-  const double n = static_cast<double>(observations.rows()), groups = observations.groups();
-  if (n <= groups) return true;
-  MatrixXd known = MatrixXd::Zero(observations.rows(), observations.channels());
-  const std::vector<Term> terms = known_terms(observations);
-  if (!terms.empty()) {
-    const MatrixXd nominal = predict_response(observations, {}, observations.all_rows());
-    for (const Term& term : terms) known += respond(term, observations, nominal).value[0];
-  }
-  const MatrixXd y = observations.y - known;
-  MatrixXd along_lines;  // where the baseline's lines, not its constants, are what makes forces differ
-  if (observations.slopes.cols() > 0)
-    along_lines = predict_response(observations, {}, observations.all_rows());
-  for (Index c = 0; c < observations.channels(); ++c) {
-    VectorXd sum = VectorXd::Zero(observations.groups()), count = sum;
-    for (Index row = 0; row < observations.rows(); ++row) {
-      sum(observations.group[static_cast<std::size_t>(row)]) += y(row, c);
-      count(observations.group[static_cast<std::size_t>(row)]) += 1;
-    }
-    const VectorXd constant = (sum.array() / count.array().max(1))(observations.group);
-    VectorXd force = observations.multiplicative
-                         ? VectorXd(constant.array() + observations.known.col(c).array().log())
-                         : constant;
-    force += known.col(c);
-    if (along_lines.size() > 0)
-      force = observations.multiplicative ? VectorXd(along_lines.col(c).array().log()) : along_lines.col(c);
-    variance += (force.array() - force.mean()).square().mean();
-    noise += (y.col(c) - constant).squaredNorm() / (n - groups) * groups / n;
-  }
-  return variance > least * noise;
+  const MatrixXd predicted =
+      predict_response(observations, {known_terms(observations), {}}, observations.all_rows());
+  const MatrixXd force = observations.multiplicative ? MatrixXd(predicted.array().log()) : predicted;
+  const double variance = (force.rowwise() - force.colwise().mean()).squaredNorm();
+  return variance > least * variance_of_constants(observations, predicted).sum();
 }
 
 }  // namespace
