@@ -48,7 +48,6 @@ class EvidenceTable {
 
 /// One stratum at one ratio: products of all columns with each other.
 struct Products {
-  Stacked columns;                  // projected: adopted first, then all candidates'
   MatrixXd adopted_adopted;         // q × q
   MatrixXd adopted_candidate;       // q × K
   std::vector<MatrixXd> candidate;  // k × k of each
@@ -67,6 +66,7 @@ struct CandidateScan::Impl {
   Index adopted = 0;
   std::vector<Candidate> candidates;
   std::vector<Index> first;                     // column of each candidate
+  std::vector<Stacked> stacked;                 // of each stratum: adopted first, then all candidates'
   std::vector<std::vector<Products>> products;  // stratum, ratio
   std::map<std::pair<int, Index>, EvidenceTable> tables;
   std::vector<const EvidenceTable*> table_of;
@@ -82,19 +82,18 @@ struct CandidateScan::Impl {
     }
     touches.assign(candidates.size(), std::vector<bool>(model.strata().size(), false));
     for (std::size_t s = 0; s < model.strata().size(); ++s) {
-      const Stacked stacked = model.stack(s, items);
+      stacked.push_back(model.stack(s, items));
       products.emplace_back();
       for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio)
-        products[s].push_back(multiply(s, ratio, stacked));
+        products[s].push_back(multiply(s, ratio, stacked[s]));
       mark_touched(s);
     }
     for (std::size_t i = 0; i < candidates.size(); ++i) table_of.push_back(table_for(i));
   }
 
-  Products multiply(std::size_t s, std::size_t ratio, const Stacked& stacked) const {
-    Products result{.columns = stacked, .adopted_adopted = {}, .adopted_candidate = {}, .candidate = {}};
-    model.project(s, ratio, result.columns);
-    const auto& c = result.columns;
+  Products multiply(std::size_t s, std::size_t ratio, Stacked c) const {
+    Products result;
+    model.project(s, ratio, c);
     result.adopted_adopted = c.leftCols(adopted).transpose() * c.leftCols(adopted);
     result.adopted_candidate = c.leftCols(adopted).transpose() * c;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -130,8 +129,10 @@ struct CandidateScan::Impl {
       for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
         Stacked projected = data[s];
         model.project(s, ratio, projected);
-        result[s].push_back({projected.colwise().squaredNorm().transpose(),
-                             products[s][ratio].columns.transpose() * projected});
+        result[s].push_back({projected.colwise().squaredNorm().transpose(), {}});
+        // In place of the columns' projections at every ratio, which would fill the memory.
+        model.whiten_transposed(s, ratio, projected);
+        result[s].back().columns = stacked[s].transpose() * projected;
       }
     }
     return result;
@@ -334,7 +335,8 @@ std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::si
     std::vector<std::size_t> ratio(count);
     for (std::size_t& r : ratio) r = draw(random);
     data.push_back(impl_->model.simulate(s, std::vector<double>(count, null.sigma[s]), ratio,
-                                         impl_->model.run_correlation(s), random));
+                                         impl_->model.run_correlation(s), random,
+                                         null.sizes.empty() ? Eigen::MatrixXd() : null.sizes[s]));
   }
   const Impl::Data products = impl_->multiply_data(data);
   std::vector<double> maxima(count, 0.0);

@@ -22,6 +22,9 @@ struct NullFit {
   std::vector<double> sigma;       // run scatter of each stratum, in y; what the columns cost is allowed for
   std::vector<std::vector<double>> ratio_probability;  // likelihood of each ratio, normalised
   double log_likelihood = 0;
+  /// Of each stratum, runs × modes, over σ: how far a run is drawn from its block, with either sign. None, or
+  /// empty: normal scatter.
+  std::vector<Eigen::MatrixXd> sizes = {};
 };
 
 /// A candidate on one data set.

@@ -288,6 +288,12 @@ void MixedModel::project(std::size_t stratum, std::size_t ratio, Stacked& column
   root.apply(by_mode);
 }
 
+void MixedModel::whiten_transposed(std::size_t stratum, std::size_t ratio, Stacked& projected) const {
+  const Index n = static_cast<Index>(rows_.size());
+  Root(blocks_, kRatios[ratio], run_correlation(stratum))
+      .apply_transposed(Eigen::Map<MatrixXd>(projected.data(), n, projected.size() / n));
+}
+
 bool MixedModel::sees(const Components& column) const {
   double before = 0, after = 0;
   for (std::size_t s = 0; s < strata_.size(); ++s) {
@@ -346,41 +352,6 @@ Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t r
     variance = row.dot(row * known->second);
   }
   return result;
-}
-
-Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sigma,
-                             const std::vector<std::size_t>& ratio, double run_correlation,
-                             std::mt19937_64& random) const {
-  std::normal_distribution<double> normal;
-  const Index n = static_cast<Index>(rows_.size());
-  const double fresh = std::sqrt(1 - run_correlation * run_correlation);
-  Eigen::VectorXd own = Eigen::VectorXd::Ones(n);  // each run's scatter
-  if (observations_.scatter.runs.size() > 0 && strata_[stratum].means()) {
-    own = observations_.scatter.runs(rows_);
-    own *= std::sqrt(static_cast<double>(n)) / own.norm();
-  }
-  Stacked result(n * strata_[stratum].modes, static_cast<Index>(sigma.size()));
-  for (Index i = 0; i < result.cols(); ++i) {
-    for (Index k = 0; k < result.rows(); ++k) result(k, i) = normal(random);
-    Eigen::Map<MatrixXd> modes(result.col(i).data(), n, strata_[stratum].modes);
-    const double session = std::sqrt(kRatios[ratio[static_cast<std::size_t>(i)]]);
-    for (Index mode = 0; mode < modes.cols(); ++mode) {
-      for (const auto& runs : blocks_) {
-        for (std::size_t k = 1; k < runs.size() && run_correlation != 0; ++k)
-          modes(runs[k], mode) = run_correlation * modes(runs[k - 1], mode) + fresh * modes(runs[k], mode);
-        const double offset = session * normal(random);
-        for (const Index run : runs) modes(run, mode) = own(run) * modes(run, mode) + offset;
-      }
-    }
-    result.col(i) *= sigma[static_cast<std::size_t>(i)];
-  }
-  return result;
-}
-
-Stacked MixedModel::simulate_unit(std::size_t stratum, std::size_t ratio, std::size_t sets,
-                                  double run_correlation, std::mt19937_64& random) const {
-  return simulate(stratum, std::vector<double>(sets, 1.0), std::vector<std::size_t>(sets, ratio),
-                  run_correlation, random);
 }
 
 }  // namespace tunnelrig

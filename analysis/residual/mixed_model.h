@@ -68,6 +68,10 @@ class MixedModel {
   /// Whitens with the ratio and takes out what the baseline can absorb, in place.
   void project(std::size_t stratum, std::size_t ratio, Stacked& columns) const;
 
+  /// Of projected columns, in place: their products with columns that are not projected are then the products
+  /// with the projections of those.
+  void whiten_transposed(std::size_t stratum, std::size_t ratio, Stacked& projected) const;
+
   /// Whether more than rounding is left of a column without what the baseline can absorb.
   bool sees(const Components& column) const;
 
@@ -82,10 +86,16 @@ class MixedModel {
                                     const std::vector<int>& rows) const;
 
   /// Draws data without any effect: session and run scatter of the given σ and ratio, and a correlation of
-  /// neighbouring runs. Stacked, a column for each σ.
+  /// neighbouring runs. Stacked, a column for each σ. `sizes`: of each run, over σ, in place of normal
+  /// scatter; its sign is drawn.
   Stacked simulate(std::size_t stratum, const std::vector<double>& sigma,
-                   const std::vector<std::size_t>& ratio, double run_correlation,
-                   std::mt19937_64& random) const;
+                   const std::vector<std::size_t>& ratio, double run_correlation, std::mt19937_64& random,
+                   const Eigen::MatrixXd& sizes = {}) const;
+
+  /// How large what is left of each run is beside what is left of runs that are alike, runs × modes, rms 1;
+  /// of each stratum, empty of a course.
+  std::vector<Eigen::MatrixXd> sizes_left(const std::vector<std::size_t>& ratio, const Components& residual,
+                                          std::mt19937_64& random) const;
   /// `sets` of them, of unit σ and one ratio.
   Stacked simulate_unit(std::size_t stratum, std::size_t ratio, std::size_t sets, double run_correlation,
                         std::mt19937_64& random) const;

@@ -5,17 +5,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <utility>
 #include <vector>
 
 namespace tunnelrig {
 
-/// Simulated as they are asked for: early enough that a campaign without effect costs little, and never
-/// before the p that was asked for is settled (Besag & Clifford 1991).
-class NullMaxima {
+/// Of data sets that are drawn from one null model, as they are asked for: early enough that a campaign
+/// without effect costs little, and never before the p that was asked for is settled (Besag & Clifford 1991).
+class DrawnMaxima {
  public:
-  NullMaxima(const CandidateScan& scan, NullFit null, const SearchSettings& settings, std::uint64_t salt)
+  DrawnMaxima(const CandidateScan& scan, NullFit null, const SearchSettings& settings, std::uint64_t salt)
       : scan_(scan), null_(std::move(null)), settings_(settings), random_(settings.seed * 1000003 + salt) {}
 
   double p(double evidence) {
@@ -53,6 +54,41 @@ class NullMaxima {
   const SearchSettings& settings_;
   std::mt19937_64 random_;
   std::vector<double> maxima_;
+};
+
+/// With normal scatter, and once more with runs as far off as what is left of them, the sign drawn: scatter
+/// may go with anything (Wu 1986: the wild bootstrap). Of the two what is less beyond chance counts.
+class NullMaxima {
+ public:
+  /// `sizes`: see NullFit; empty: normal scatter alone.
+  NullMaxima(const CandidateScan& scan, NullFit null, std::vector<Eigen::MatrixXd> sizes,
+             const SearchSettings& settings, std::uint64_t salt)
+      : normal_(scan, null, settings, salt), alpha_(settings.alpha) {
+    if (sizes.empty()) return;
+    constexpr std::uint64_t kOther = 500000;
+    null.sizes = std::move(sizes);
+    by_size_.emplace(scan, std::move(null), settings, salt + kOther);
+  }
+
+  double p(double evidence) {
+    const double p = normal_.p(evidence);
+    return by_size_ && p <= alpha_ ? std::max(p, by_size_->p(evidence)) : p;
+  }
+  /// The evidence that only α of the null campaigns exceed.
+  double critical() {
+    by_size_decides_ = by_size_ && by_size_->critical() > normal_.critical();
+    return by_size_decides_ ? by_size_->critical() : normal_.critical();
+  }
+  /// Those that the critical evidence is of.
+  const std::vector<double>& values() const {
+    return by_size_decides_ ? by_size_->values() : normal_.values();
+  }
+
+ private:
+  DrawnMaxima normal_;
+  std::optional<DrawnMaxima> by_size_;
+  bool by_size_decides_ = false;
+  double alpha_;
 };
 
 }  // namespace tunnelrig

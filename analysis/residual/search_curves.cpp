@@ -105,7 +105,7 @@ bool Search::add_best_curve(const CurveScan& curves) {
   const auto& [scan, tried] = curves;
   if (tried.empty()) return false;
   const std::size_t best = scan.order[0];
-  NullMaxima maxima(*scan.scan, fit_.variances, settings_, 1000 + ++salt_);
+  NullMaxima maxima(*scan.scan, fit_.variances, sizes_beside(fit_), settings_, 1000 + ++salt_);
   const double p = maxima.p(scan.fits[best].evidence);
   Round round;
   round.observed = scan.fits[best].evidence;
@@ -148,8 +148,8 @@ void Search::doubt_formulas() {
       scan.candidates.push_back(as_candidate(bend));
       if (!mixed_->sees(scan.candidates[0].columns[0])) continue;
       rank(fit_, scan);
-      const double p =
-          NullMaxima(*scan.scan, fit_.variances, settings_, 2000 + ++salt_).p(scan.fits[0].evidence);
+      const double p = NullMaxima(*scan.scan, fit_.variances, sizes_beside(fit_), settings_, 2000 + ++salt_)
+                           .p(scan.fits[0].evidence);
       if (p > kDoubtedP) continue;
       const JointFit before = fit_;
       add_curve(bend, p);
@@ -181,7 +181,7 @@ void Search::drop_what_a_curve_replaces() {
 
 bool Search::is_still_found(const Term& term, const JointFit& without) {
   const Scan scan = scan_effects(without);
-  NullMaxima maxima(*scan.scan, without.variances, settings_, 4000 + ++salt_);
+  NullMaxima maxima(*scan.scan, without.variances, sizes_beside(without), settings_, 4000 + ++salt_);
   return maxima.p(evidence_of(scan, term)) <= settings_.alpha;
 }
 

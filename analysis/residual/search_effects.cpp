@@ -95,7 +95,7 @@ bool Search::add_best_effect() {
   const Scan scan = scan_effects_and_groups(fit_);
   Round round;
   if (scan.order.empty()) return false;
-  NullMaxima maxima(*scan.scan, fit_.variances, settings_, ++salt_);
+  NullMaxima maxima(*scan.scan, fit_.variances, sizes_beside(fit_), settings_, ++salt_);
   const double p = maxima.p(scan.fits[scan.order[0]].evidence);
   if (p <= settings_.alpha || critical_ == 0) critical_ = maxima.critical();
   round.observed = scan.fits[scan.order[0]].evidence;
@@ -108,6 +108,13 @@ bool Search::add_best_effect() {
     round.outcome = fmt::format("nothing: p = {:.3g} for {}", p, scan.ways[scan.order[0]].label());
   result_.rounds.push_back(std::move(round));
   return added;
+}
+
+std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit) const {
+  constexpr Index kFewest = 20;
+  if (mixed_->dof(0) < kFewest) return {};
+  std::mt19937_64 random(settings_.seed * 1000003 + 6000);
+  return mixed_->sizes_left(fit.variances.ratio, difference(y_, fit.linear.offset), random);
 }
 
 std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const {
