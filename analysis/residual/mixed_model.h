@@ -92,9 +92,12 @@ class MixedModel {
                    const std::vector<std::size_t>& ratio, double run_correlation, std::mt19937_64& random,
                    const Eigen::MatrixXd& sizes = {}) const;
 
-  /// How large what is left of each run is beside what is left of runs that are alike, runs × modes, rms 1;
-  /// of each stratum, empty of a course.
-  std::vector<Eigen::MatrixXd> sizes_left(const std::vector<std::size_t>& ratio, const Components& residual,
+  /// How far each run is, over σ, from what the model with `columns` says of it without that run (over 1 −
+  /// h); runs × modes, rms 1; of each stratum, empty of a course. `residual`: what they leave. `sigma`: of
+  /// each stratum.
+  std::vector<Eigen::MatrixXd> sizes_left(const std::vector<std::size_t>& ratio,
+                                          const std::vector<double>& sigma, const Components& residual,
+                                          const std::vector<Components>& columns,
                                           std::mt19937_64& random) const;
   /// `sets` of them, of unit σ and one ratio.
   Stacked simulate_unit(std::size_t stratum, std::size_t ratio, std::size_t sets, double run_correlation,

@@ -94,9 +94,10 @@ class Search {
   /// sessions are few.
   double critical_rms(const Candidate& candidate, double amplitude, double error) const;
   double rms_of(const Eigen::MatrixXd& column) const;
-  /// For the data that are drawn once more: scatter may go with anything. None of few runs, whose signs make
-  /// too few data sets.
-  std::vector<Eigen::MatrixXd> sizes_beside(const JointFit& fit) const;
+  /// For the data that are drawn once more: scatter may go with anything, but what a candidate explains of
+  /// the runs is none. Nothing of few runs, whose signs make too few data sets.
+  std::vector<Eigen::MatrixXd> sizes_beside(const JointFit& fit, const Candidate& candidate,
+                                            const CandidateFit& found) const;
 
   // structure without a name: search_curves.cpp
   /// Whether one rotor scatters more than another, or neighbouring runs resemble each other, beside the model

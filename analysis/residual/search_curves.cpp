@@ -105,7 +105,8 @@ bool Search::add_best_curve(const CurveScan& curves) {
   const auto& [scan, tried] = curves;
   if (tried.empty()) return false;
   const std::size_t best = scan.order[0];
-  NullMaxima maxima(*scan.scan, fit_.variances, sizes_beside(fit_), settings_, 1000 + ++salt_);
+  NullMaxima maxima(*scan.scan, fit_.variances, sizes_beside(fit_, scan.candidates[best], scan.fits[best]),
+                    settings_, 1000 + ++salt_);
   const double p = maxima.p(scan.fits[best].evidence);
   Round round;
   round.observed = scan.fits[best].evidence;
@@ -148,8 +149,10 @@ void Search::doubt_formulas() {
       scan.candidates.push_back(as_candidate(bend));
       if (!mixed_->sees(scan.candidates[0].columns[0])) continue;
       rank(fit_, scan);
-      const double p = NullMaxima(*scan.scan, fit_.variances, sizes_beside(fit_), settings_, 2000 + ++salt_)
-                           .p(scan.fits[0].evidence);
+      const double p =
+          NullMaxima(*scan.scan, fit_.variances, sizes_beside(fit_, scan.candidates[0], scan.fits[0]),
+                     settings_, 2000 + ++salt_)
+              .p(scan.fits[0].evidence);
       if (p > kDoubtedP) continue;
       const JointFit before = fit_;
       add_curve(bend, p);
@@ -181,7 +184,10 @@ void Search::drop_what_a_curve_replaces() {
 
 bool Search::is_still_found(const Term& term, const JointFit& without) {
   const Scan scan = scan_effects(without);
-  NullMaxima maxima(*scan.scan, without.variances, sizes_beside(without), settings_, 4000 + ++salt_);
+  if (scan.order.empty()) return false;
+  const std::size_t best = scan.order[0];
+  NullMaxima maxima(*scan.scan, without.variances,
+                    sizes_beside(without, scan.candidates[best], scan.fits[best]), settings_, 4000 + ++salt_);
   return maxima.p(evidence_of(scan, term)) <= settings_.alpha;
 }
 

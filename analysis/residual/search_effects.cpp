@@ -95,7 +95,9 @@ bool Search::add_best_effect() {
   const Scan scan = scan_effects_and_groups(fit_);
   Round round;
   if (scan.order.empty()) return false;
-  NullMaxima maxima(*scan.scan, fit_.variances, sizes_beside(fit_), settings_, ++salt_);
+  const std::size_t best = scan.order[0];
+  NullMaxima maxima(*scan.scan, fit_.variances, sizes_beside(fit_, scan.candidates[best], scan.fits[best]),
+                    settings_, ++salt_);
   const double p = maxima.p(scan.fits[scan.order[0]].evidence);
   if (p <= settings_.alpha || critical_ == 0) critical_ = maxima.critical();
   round.observed = scan.fits[scan.order[0]].evidence;
@@ -110,11 +112,16 @@ bool Search::add_best_effect() {
   return added;
 }
 
-std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit) const {
+std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Candidate& candidate,
+                                                  const CandidateFit& found) const {
   constexpr Index kFewest = 20;
   if (mixed_->dof(0) < kFewest) return {};
+  Components residual = difference(y_, fit.linear.offset);
+  for (std::size_t c = 0; c < candidate.columns.size(); ++c)
+    for (std::size_t k = 0; k < residual.size(); ++k)
+      residual[k] -= found.amplitude(static_cast<Index>(c)) * candidate.columns[c][k];
   std::mt19937_64 random(settings_.seed * 1000003 + 6000);
-  return mixed_->sizes_left(fit.variances.ratio, difference(y_, fit.linear.offset), random);
+  return mixed_->sizes_left(fit.variances.ratio, fit.variances.sigma, residual, candidate.columns, random);
 }
 
 std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const {

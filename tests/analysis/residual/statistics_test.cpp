@@ -156,7 +156,7 @@ TEST_F(Statistics, ARotorThatScattersMoreIsNoStructure) {
   EXPECT_LE(said, 7) << "binomial (40, 0.06): beyond 7 in 0.2 % of cases";
 }
 
-/// By normal scatter alone 24 of 180 such campaigns have structure, by signs as well 2.
+/// By normal scatter alone 24 of 180 such campaigns have structure, by signs as well 3.
 TEST_F(Statistics, ScatterThatGoesWithAConditionIsNoStructure) {
   SearchSettings settings;
   settings.simulations = 199;
@@ -177,6 +177,26 @@ TEST_F(Statistics, ScatterThatGoesWithAConditionIsNoStructure) {
   }
   std::cout << said << " of " << kCampaigns << " with structure\n";
   EXPECT_LE(said, 5) << "α is 0.02 for names, and again for curves";
+}
+
+/// Their signs alone would agree by chance in one of sixteen; that they agree in size is what tells.
+TEST_F(Statistics, AFewRunsThatAgreeAreFound) {
+  SearchSettings settings;
+  settings.simulations = 199;
+  constexpr int kCampaigns = 10;
+  int found = 0;
+  for (int i = 0; i < kCampaigns; ++i) {
+    Observations o = campaign(0.4, 4, 0);
+    test::add_covariate(o, "tunnel_airspeed_m_s", 0, 0.4, random);
+    MatrixXd& airspeed = o.covariates.back().value;
+    for (const Eigen::Index gust : {3, 15, 30, 44, 71}) airspeed(gust, 0) = 4;
+    test::add_effect(o, "axial_wind", {0.0008});  // 6 σ of a run in a gust
+    settings.seed = static_cast<std::uint64_t>(i) + 1;
+    const Attribution result = attribute(o, o.all_rows(), test::every_effect(), settings);
+    found += result.accepted.size() == 1 && result.accepted[0].term.effect->name == "axial_wind" ? 1 : 0;
+  }
+  std::cout << found << " of " << kCampaigns << " found\n";
+  EXPECT_GE(found, 8);
 }
 
 TEST_F(Statistics, FittedParametersScatterAsTheirErrorsSay) {
