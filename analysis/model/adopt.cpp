@@ -1,7 +1,6 @@
 #include "analysis/model/adopt.h"
 
 #include "analysis/residual/explanation_output.h"
-#include "calibration/distributions.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -125,7 +124,6 @@ Adoption adopt(const Observations& observations, const Explanation& explanation,
     return result;
   }
   const AmplitudeFit fit = joint_fit_of(observations, explanation);
-  const double to_standard = 1 / (2 * student_t_quantile(0.975, model.dof));
   Placed placed;
   Index column = 0;
   for (const AdoptedEffect& adopted : explanation.adopted) {
@@ -133,8 +131,7 @@ Adoption adopt(const Observations& observations, const Explanation& explanation,
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k) {
       const bool has = has_column(model.terms.back(), k);
       placed.column.push_back(has ? column++ : -1);
-      placed.uncertainty.push_back(
-          has ? (adopted.parameters[k].high - adopted.parameters[k].low) * to_standard : 0);
+      placed.uncertainty.push_back(has ? adopted.parameters[k].standard_error : 0);
     }
     if (!adopted.confounded_with.empty())
       result.notes.push_back(fmt::format("{} is adopted, and these data cannot tell it from {}",

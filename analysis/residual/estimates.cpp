@@ -88,11 +88,19 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
       const double mean = std::accumulate(values[t][k].begin(), values[t][k].end(), 0.0) / n;
       double squares = 0;
       for (const double value : values[t][k]) squares += (value - mean) * (value - mean);
-      const double half = student_t_quantile(0.975, n - 1) * std::sqrt((n - 1) / n * squares);
+      const double error = std::sqrt((n - 1) / n * squares);
       const bool theory = k == 0 && fit.model.terms[t].at_theory;
       const double value = theory ? fit.model.terms[t].parameters[k] : centre.terms[t].parameters[k];
-      const double middle = centre.terms[t].parameters[k];
-      result[t].push_back({parameter.name, parameter.unit, value, middle - half, middle + half, theory, {}});
+      const double middle = centre.terms[t].parameters[k], half = student_t_quantile(0.975, n - 1) * error;
+      // No time is below zero. What an amplitude's interval says of its sign stays said.
+      const bool bounded = parameter.role == ParameterRole::kShape;
+      result[t].push_back({.name = parameter.name,
+                           .unit = parameter.unit,
+                           .value = value,
+                           .low = bounded ? std::max(middle - half, parameter.lower) : middle - half,
+                           .high = bounded ? std::min(middle + half, parameter.upper) : middle + half,
+                           .standard_error = error,
+                           .theory = theory});
     }
   }
   return result;

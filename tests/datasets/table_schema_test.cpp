@@ -3,6 +3,7 @@
 #include "support/message_of.h"
 #include "support/temporary_folder.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -92,7 +93,7 @@ TEST(TableSchema, ValuesThatTheirMeaningRulesOutAreRefused) {
         Case{"rpm", "speed_rpm", "-3000", "3000", "-3000 rpm is no rotor speed"},
         Case{"degC", "cell_temperature_C", "290", "40", "290 degC is no temperature of a cell"},
         Case{"degC", "air_temperature_C", "293", "20", "293 degC is no temperature of air"}}) {
-    const auto csv = [](const std::string& value) { return "y,x\n1," + value + "\n2," + value + "\n"; };
+    const auto csv = [](const std::string& value) { return fmt::format("y,x\n1,{0}\n2,{0}\n", value); };
     EXPECT_THAT(refusal("", covariate("x", c.unit, c.meaning), csv(c.bad)),
                 HasSubstr(std::string("t.csv:2: column x: ") + c.reason));
     EXPECT_EQ(read("", covariate("x", c.unit, c.meaning), csv(c.good)).rows.size(), 2u) << c.meaning;

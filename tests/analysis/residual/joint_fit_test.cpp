@@ -1,6 +1,7 @@
 // All parameters at once, on data whose truth is known.
 #include "analysis/residual/joint_fit.h"
 
+#include "analysis/residual/explanation_parts.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 
@@ -70,6 +71,23 @@ TEST_F(JointFitTest, TheCourseWithinRunsSharpensTheTimeConstant) {
     return standard_error;
   };
   EXPECT_LT(error_of(o), error_of(means));
+}
+
+TEST_F(JointFitTest, IntervalsOfTimeConstantsKeepTheirBounds) {
+  Observations o = observations(1, 0, 2e-3);
+  test::add_effect(o, "creep", {0.001, 60});  // too small for its time constant to be known
+  const auto rows = o.all_rows();
+  const JointFit fit = fit_jointly(o, {{term("creep", {0.01, 60})}, {}}, rows);
+  const auto estimates = estimate_parameters(o, fit, rows);
+  ASSERT_EQ(estimates.size(), 1u);
+  ASSERT_EQ(estimates[0].size(), 2u);
+  const ParameterEstimate& tau = estimates[0][1];
+  const EffectParameter& bounds = fit.model.terms[0].effect->parameters[1];
+  EXPECT_GE(tau.low, bounds.lower);
+  EXPECT_LE(tau.high, bounds.upper);
+  EXPECT_LT(tau.value - 2.16 * tau.standard_error, bounds.lower) << "it would go below";
+  EXPECT_LE(tau.low, tau.value);
+  EXPECT_GE(tau.high, tau.value);
 }
 
 TEST_F(JointFitTest, KeepsBoundsAndSaysSo) {
