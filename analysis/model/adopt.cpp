@@ -39,7 +39,7 @@ ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Obse
                     .tilt = curve.tilt,
                     .levels = curve.levels,
                     .labels = curve.labels,
-                    .place = curve.place.name};
+                    .place = curve.in_place()};
   // The mean over the runs is the baseline's: without it the curve would shift every coefficient.
   const Covariate& covariate = *observations.find(curve.covariate);
   const Index rotor = std::max(curve.rotor, 0);
@@ -49,6 +49,7 @@ ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Obse
     for (Index row = 0; row < observations.rows(); ++row) sum += result.column(k, covariate.at(row, rotor));
     result.centre[k] = sum / static_cast<double>(observations.rows());
   }
+  if (curve.strength) result.times = {curve.times(), *curve.strength, curve.columns[0][0].col(0).mean()};
   return result;
 }
 

@@ -42,6 +42,7 @@ class Forward {
       next += static_cast<Index>(curve.coefficients.size());
       curve_covariates_.push_back(observations.find(curve.covariate));
       curve_places_.push_back(observations.find_place(curve.place));
+      curve_times_.push_back(curve.times ? observations.find(curve.times->covariate) : nullptr);
     }
     predict_forces();
   }
@@ -67,6 +68,8 @@ class Forward {
       const ModelCurve& curve = model_.curves[k];
       if (missing(curve_covariates_[k], curve.rotor))
         return fmt::format("it has no {}, which the adopted {} needs", curve.covariate, curve.label());
+      if (curve.times && missing(curve_times_[k], curve.rotor))
+        return fmt::format("it has no {}, which the adopted {} needs", curve.times->covariate, curve.label());
       if (curve.shape == CurveShape::kLevels && !is_level(k, row))
         return fmt::format("its {} is none that the adopted {} knows", curve.covariate, curve.label());
     }
@@ -186,9 +189,11 @@ class Forward {
       const ModelCurve& curve = model_.curves[k];
       if (curve.rotor >= 0 && channel != curve.rotor) continue;
       const double x = std::clamp(condition(k, row, channel), curve.low, curve.high);
-      const double weight = curve_places_[k] == nullptr ? 1 : curve_places_[k]->weight(row);
+      double weight = curve_places_[k] == nullptr ? 1 : curve_places_[k]->weight(row);
+      if (curve.times) weight = curve.times->strength.at(curve_times_[k]->at(row, channel));
+      const double mean = curve.times ? curve.times->mean : 0;
       for (std::size_t b = 0; b < curve.coefficients.size(); ++b)
-        sum += weight * parameters(first_curve_[k] + static_cast<Index>(b)) * curve.column(b, x);
+        sum += parameters(first_curve_[k] + static_cast<Index>(b)) * (weight * curve.column(b, x) - mean);
     }
     return sum;
   }
@@ -198,7 +203,8 @@ class Forward {
   std::vector<Index> first_, first_curve_;
   std::vector<std::vector<const Covariate*>> term_covariates_;
   std::vector<const Covariate*> curve_covariates_;
-  std::vector<const Place*> curve_places_;  // null: alike everywhere
+  std::vector<const Place*> curve_places_;     // null: alike everywhere
+  std::vector<const Covariate*> curve_times_;  // null: with no other condition
   MatrixXd predicted_;
 };
 

@@ -141,6 +141,11 @@ Json curve_json(const ModelCurve& curve) {
   if (!curve.levels.empty()) json["levels"] = curve.levels;
   if (!curve.labels.empty()) json["labels"] = curve.labels;
   if (!curve.place.empty()) json["place"] = curve.place;
+  if (curve.times)
+    json["times"] = {{"covariate", curve.times->covariate},
+                     {"centre", curve.times->strength.centre},
+                     {"scale", curve.times->strength.scale},
+                     {"mean", curve.times->mean}};
   return json;
 }
 
@@ -149,6 +154,14 @@ CurveShape shape_of(const Reader& reader) {
   if (!reader.has("shape")) return CurveShape::kWaves;
   if (const auto shape = curve_shape(reader.text("shape"))) return *shape;
   reader.fail("has a shape which this program does not know");
+}
+
+OtherCondition condition_of(const Reader& reader) {
+  OtherCondition condition{.covariate = reader.text("covariate"),
+                           .strength = {.centre = reader.number("centre"), .scale = reader.number("scale")},
+                           .mean = reader.number("mean")};
+  if (!(condition.strength.scale > 0)) reader.fail("has a scale that is not above 0");
+  return condition;
 }
 
 ModelCurve curve_of(const Reader& reader) {
@@ -163,6 +176,7 @@ ModelCurve curve_of(const Reader& reader) {
                    .levels = reader.has("levels") ? reader.numbers("levels") : std::vector<double>(),
                    .labels = reader.has("labels") ? reader.texts("labels") : std::vector<std::string>(),
                    .place = reader.has("place") ? reader.text("place") : std::string()};
+  if (reader.has("times")) curve.times = condition_of(reader.object("times"));
   if (curve.covariate == "start_utc") curve.covariate = "hours_in_session";  // as it was called at first
   if (!(curve.high > curve.low)) reader.fail("has no range: high is not above low");
   if (is_of_logarithm(curve.shape) && !(curve.low > 0))
@@ -213,7 +227,8 @@ double ModelCurve::column(std::size_t k, double x) const {
 }
 
 std::string ModelCurve::label() const {
-  return fmt::format("curve over {}{}{} (empirical)", covariate, place.empty() ? "" : " × " + place,
+  const std::string with = times ? times->covariate : place;
+  return fmt::format("curve over {}{}{} (empirical)", covariate, with.empty() ? "" : " × " + with,
                      rotor < 0 ? "" : fmt::format(" of rotor {}", rotor + 1));
 }
 

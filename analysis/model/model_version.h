@@ -5,6 +5,7 @@
 #include "analysis/residual/curve_basis.h"
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,13 @@ struct ModelTerm {
   std::string label() const;  // "creep of rotor 2"
 };
 
+/// What a slope goes with; `mean` of the product over the runs that it was found in is the baseline's.
+struct OtherCondition {
+  std::string covariate;
+  Strength strength;
+  double mean = 0;
+};
+
 /// A curve without a name: y changes by Σ a_k (column_k(x) − tilt_k s(x) − centre_k) between `low` and
 /// `high`, and is held there beyond (curve_basis.h); of levels it is known only at these.
 struct ModelCurve {
@@ -34,10 +42,11 @@ struct ModelCurve {
   CurveShape shape = CurveShape::kWaves;
   double low = 0, high = 1;
   std::vector<double> coefficients, centre;
-  std::vector<double> tilt = {};         // empty: none
-  std::vector<double> levels = {};       // of CurveShape::kLevels, one more than coefficients
-  std::vector<std::string> labels = {};  // of a column of texts: x = i + 1 stands for labels[i]
-  std::string place = {};                // times the run's weight there (Place); empty: alike everywhere
+  std::vector<double> tilt = {};             // empty: none
+  std::vector<double> levels = {};           // of CurveShape::kLevels, one more than coefficients
+  std::vector<std::string> labels = {};      // of a column of texts: x = i + 1 stands for labels[i]
+  std::string place = {};                    // times the run's weight there (Place); empty: alike everywhere
+  std::optional<OtherCondition> times = {};  // or times the strength of another condition
 
   double column(std::size_t k, double x) const;  // of the k-th coefficient, from 0, with tilt and centre
   std::string label() const;                     // "curve over relative_humidity (empirical)"

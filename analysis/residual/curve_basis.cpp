@@ -1,5 +1,6 @@
 #include "analysis/residual/curve_basis.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -9,6 +10,8 @@ bool is_of_logarithm(CurveShape shape) {
   return shape == CurveShape::kLogParabola || shape == CurveShape::kLevelling ||
          shape == CurveShape::kLogStraight;
 }
+
+double Strength::at(double x) const { return std::clamp((x - centre) / scale, -1.0, 1.0); }
 
 double curve_straight(CurveShape shape, double x, double low, double high) {
   return 2 * (is_of_logarithm(shape) ? std::log(x / low) / std::log(high / low) : (x - low) / (high - low)) -

@@ -20,6 +20,13 @@ enum class CurveShape {
 /// Whether s is that of ln x: then x is above 0.
 bool is_of_logarithm(CurveShape shape);
 
+/// How strong a slope is that goes with another condition x: 0 at the mean of the runs, ±1 at the farthest of
+/// them, and no stronger beyond.
+struct Strength {
+  double centre = 0, scale = 1;
+  double at(double x) const;
+};
+
 /// s: −1 at `low`, 1 at `high`, beyond them outside.
 double curve_straight(CurveShape shape, double x, double low, double high);
 

@@ -20,8 +20,8 @@ constexpr std::array<int, 3> kBends = {2, 4, 6};
 /// A value of few is told apart if as many blocks have it as a step needs on either side.
 constexpr std::size_t kBlocksPerLevel = 3, kMostLevels = 12;
 
-/// That a condition does different things in different places is less likely beforehand than that it does
-/// one.
+/// That a condition does different things in different places, or under another condition, is less likely
+/// beforehand than that it does one.
 constexpr double kPlaceWeight = 0.2;
 
 Components nothing(const Observations& observations) {
@@ -99,6 +99,43 @@ std::vector<Place> places_to_try(const Observations& observations, const std::ve
       result.push_back(place);
   }
   return result;
+}
+
+/// Numbers that differ between the runs.
+bool can_be_followed(const Observations& observations, const Covariate& covariate) {
+  return !observations.not_usable.contains(covariate.name) && covariate.value.allFinite() &&
+         covariate.value.maxCoeff() > covariate.value.minCoeff();
+}
+
+/// What two conditions do together and neither does alone: the product of both, each from its mean. Two that
+/// go together make a bend of one.
+void add_products(const Observations& observations, std::vector<Curve>& curves) {
+  constexpr double kTogether = 0.9;  // correlation
+  std::vector<const Covariate*> conditions;
+  for (const Covariate& covariate : observations.covariates)
+    if (!covariate.derived && !covariate.per_channel() && covariate.labels.empty() &&
+        can_be_followed(observations, covariate))
+      conditions.push_back(&covariate);
+  for (std::size_t a = 0; a < conditions.size(); ++a)
+    for (std::size_t b = a + 1; b < conditions.size(); ++b) {
+      const Covariate &first = *conditions[a], &second = *conditions[b];
+      if (std::abs(correlation(first, second)) > kTogether) continue;
+      const double low = first.value.minCoeff(), high = first.value.maxCoeff(), mean = first.value.mean();
+      const Eigen::ArrayXd from_mean = second.value.col(0).array() - second.value.mean();
+      const Strength strength{.centre = second.value.mean(), .scale = from_mean.abs().maxCoeff()};
+      const auto column_at = [&](int k, double x) {
+        return curve_column(CurveShape::kStraight, k, x, low, high) -
+               curve_straight(CurveShape::kStraight, mean, low, high);
+      };
+      Curve curve{.covariate = first.name,
+                  .shape = CurveShape::kStraight,
+                  .columns = columns_over(observations, first, -1, 1, column_at),
+                  .x = first.value,
+                  .place = {second.name, from_mean / strength.scale},
+                  .strength = strength};
+      curve.columns[0][0] = curve.place.weight.asDiagonal() * curve.columns[0][0];
+      curves.push_back(std::move(curve));
+    }
 }
 
 /// Whether another condition of the runs goes with it: sessions that all begin at one hour.
@@ -211,6 +248,7 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
     for (const int count : kBends)
       if (count <= most && gap * count <= 2) add(CurveShape::kWaves, count);
   }
+  add_products(observations, curves);
   if (!observations.shape.empty())
     for (const int rotor : rotors)
       curves.push_back(

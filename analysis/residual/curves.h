@@ -5,6 +5,7 @@
 #include "analysis/residual/curve_basis.h"
 #include "analysis/residual/likelihood.h"
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,22 +18,26 @@ struct Curve {
   int rotor = -1;
   CurveShape shape = CurveShape::kWaves;
   std::vector<Components> columns;
-  std::vector<double> tilt = {};         // of each column: what was taken out of it of s; empty: nothing
-  Eigen::MatrixXd x;                     // n × 1 or n × c: what it is drawn against; empty for time_in_run
-  std::vector<double> levels = {};       // of kLevels: the values told apart, the most common first
-  std::vector<std::string> labels = {};  // of texts: value i + 1 stands for labels[i]
-  Place place = {};                      // what it is drawn for is a weight of 1
+  std::vector<double> tilt = {};          // of each column: what was taken out of it of s; empty: nothing
+  Eigen::MatrixXd x;                      // n × 1 or n × c: what it is drawn against; empty for time_in_run
+  std::vector<double> levels = {};        // of kLevels: the values told apart, the most common first
+  std::vector<std::string> labels = {};   // of texts: value i + 1 stands for labels[i]
+  Place place = {};                       // what it is drawn for is a weight of 1
+  std::optional<Strength> strength = {};  // where it goes with another condition, which `place` names then
 
   std::string label() const;
   bool everywhere() const { return place.name.empty(); }
+  /// Where it goes with a place, or with another condition; empty elsewhere.
+  std::string in_place() const { return strength ? "" : place.name; }
+  std::string times() const { return strength ? place.name : ""; }
   /// Whether it is over the same, of the same rotor and in the same places.
   bool is_like(const Curve& other) const;
 };
 
 /// Curves over everything that is known of the runs: a bend beside whatever trend has a name, waves, and
 /// where there are few values (always with texts) a constant for each; straight lines whose slope goes with
-/// the place in the tunnel. `rows` decide how many bends a covariate can show: one for every three different
-/// values, at most six.
+/// the place in the tunnel, or with another condition. `rows` decide how many bends a covariate can show: one
+/// for every three different values, at most six.
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows);
 
 /// Over all rows, of the first channel; 0 where one of them is constant.

@@ -45,6 +45,8 @@ std::vector<Drawn> drawn_curve(const Curve& curve, double low, double high) {
     points.push_back({x, VectorXd(static_cast<Index>(curve.columns.size()))});
     for (std::size_t b = 0; b < curve.columns.size(); ++b)
       points.back().columns(static_cast<Index>(b)) = tilted_column(curve.shape, curve.tilt, b, x, low, high);
+    if (curve.strength)  // it turns about the mean
+      points.back().columns.array() -= curve_straight(curve.shape, curve.x.mean(), low, high);
   }
   return points;
 }
@@ -53,7 +55,7 @@ std::vector<Drawn> drawn_curve(const Curve& curve, double low, double high) {
 /// line's, of which the fit gives the curve a part or not: it is taken out of what is drawn.
 void take_out_baseline(const Observations& observations, const std::vector<int>& rows, const Curve& curve,
                        double low, double high, std::vector<Drawn>& points) {
-  if (observations.slopes.cols() == 0 || curve.x.cols() != 1) return;
+  if (observations.slopes.cols() == 0 || curve.x.cols() != 1 || curve.strength) return;
   const auto n = static_cast<Index>(rows.size()), k = static_cast<Index>(curve.columns.size());
   for (const CurveShape shape : {CurveShape::kStraight, CurveShape::kLogStraight}) {
     if (is_of_logarithm(shape) && low <= 0) return;
@@ -95,7 +97,8 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   UnknownStructure result{.covariate = found.curve.covariate,
                           .condition = found.curve.covariate,
                           .covariate_unit = {},
-                          .place = found.curve.place.name,
+                          .place = found.curve.in_place(),
+                          .times = found.curve.times(),
                           .rotor = found.curve.rotor,
                           .p_value = found.p,
                           .shape = {},
@@ -130,7 +133,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
     result.shape.push_back({point.x, value, value - half, value + half});
     mean += value;
   }
-  mean /= static_cast<double>(result.shape.size());
+  mean = found.curve.strength ? 0 : mean / static_cast<double>(result.shape.size());
   double lowest = 1e300, highest = -1e300;
   for (ShapePoint& point : result.shape) {
     point.y -= mean;
@@ -149,6 +152,7 @@ UnknownStructure describe_sessions(const Observations& observations, const Matri
                           .condition = "session",
                           .covariate_unit = {},
                           .place = {},
+                          .times = {},
                           .p_value = 0.025,
                           .shape = {},
                           .labels = {},

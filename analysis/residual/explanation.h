@@ -53,6 +53,7 @@ struct UnknownStructure {
   std::string condition;       // the same as the observations have it: hours_in_session, hour_of_day
   std::string covariate_unit;  // empty: the name says it, or it is not known
   std::string place;           // what its slope goes with (Place); empty: alike everywhere
+  std::string times;           // the other condition that its slope goes with; empty: none
   int rotor = -1;
   double p_value = 1;
   double amplitude = 0;  // half of peak to peak, unit of the response

@@ -1,6 +1,7 @@
 // The explanation's page: what its scripts draw (analysis/report/page/explanation*.js), as one document.
 #include "analysis/report/render.h"
 #include "analysis/residual/explanation_output.h"
+#include "analysis/residual/upper_median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,6 +21,11 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kCoursePoints = 41;
 constexpr double kLeastShown = 0.5;  // weight of a place
+
+std::vector<double> sizes_of(const VectorXd& values) {
+  const VectorXd sizes = values.cwiseAbs();
+  return {sizes.begin(), sizes.end()};
+}
 
 /// As many digits as a picture shows; what is not known is null.
 Json drawn(double value) {
@@ -139,23 +145,27 @@ class Page {
   }
 
   /// Points of one covariate: the residual with everything else in, and what this term makes of it. Of a
-  /// place: runs where it counts by half or more, turned round where it is below zero.
+  /// place: runs where it counts by half or more, turned round where it is below zero; of another condition
+  /// that half of the runs where it counts more.
   Json panel(const std::string& label, const std::string& covariate, const MatrixXd& x, int rotor,
-             const MatrixXd& fitted, const Place& place = {}) const {
+             const MatrixXd& fitted, const Curve& curve = {}) const {
+    const VectorXd& weight_of_run = curve.place.weight;
+    const double least_shown = curve.strength ? upper_median(sizes_of(weight_of_run)) : kLeastShown;
     const Covariate* known = observations_.find(covariate);
     Json json{{"label", label},
               {"covariate", covariate},
               {"covariate_unit", known == nullptr ? "" : known->unit},
               {"labels", known == nullptr ? std::vector<std::string>{} : known->labels},
-              {"place", place.name},
+              {"place", curve.in_place()},
+              {"times", curve.times()},
               {"rotor", rotor_number(rotor)}};
     for (Index c = 0; c < observations_.channels(); ++c) {
       if (rotor >= 0 && c != rotor) continue;
       for (const int row : rows_) {
         const double at = x(row, x.cols() > 1 ? c : 0);
         if (!std::isfinite(at) || !std::isfinite(after_(row, c))) continue;
-        const double weight = place.name.empty() ? 1 : place.weight(row);
-        if (std::abs(weight) < kLeastShown) continue;
+        const double weight = curve.everywhere() ? 1 : weight_of_run(row);
+        if (std::abs(weight) < least_shown) continue;
         const double side = weight < 0 ? -1 : 1;
         json["run"].push_back(row);
         json["channel"].push_back(c + 1);
@@ -200,7 +210,7 @@ class Page {
   void add_unknown(const UnknownStructure& unknown, Json& list) const {
     for (const Curve& curve : explanation_.model.curves) {
       if (curve.covariate != unknown.condition || curve.rotor != unknown.rotor ||
-          curve.place.name != unknown.place || curve.x.size() == 0)
+          curve.in_place() != unknown.place || curve.times() != unknown.times || curve.x.size() == 0)
         continue;
       MatrixXd shape = MatrixXd::Zero(observations_.rows(), observations_.channels());
       for (Index row = 0; row < shape.rows(); ++row)
@@ -210,8 +220,8 @@ class Page {
                                 ? at_level(unknown.shape, curve.x(row, 0), curve.levels[0])
                                 : interpolated(unknown.shape, curve.x(row, curve.x.cols() > 1 ? c : 0));
       if (!curve.everywhere()) shape = curve.place.weight.asDiagonal() * shape;
-      list.push_back(panel("unknown: " + curve.label(), curve.covariate, curve.x, curve.rotor, visible(shape),
-                           curve.place));
+      list.push_back(
+          panel("unknown: " + curve.label(), curve.covariate, curve.x, curve.rotor, visible(shape), curve));
       return;
     }
     if (unknown.covariate == "session") {

@@ -58,6 +58,7 @@ Json unknown_json(const UnknownStructure& unknown) {
   return {{"covariate", unknown.covariate},
           {"covariate_unit", unknown.covariate_unit},
           {"place", unknown.place.empty() ? Json(nullptr) : Json(unknown.place)},
+          {"times", unknown.times.empty() ? Json(nullptr) : Json(unknown.times)},
           {"rotor", rotor_json(unknown.rotor)},
           {"p_value", finite(unknown.p_value)},
           {"amplitude", finite(unknown.amplitude)},
@@ -205,6 +206,10 @@ std::string explanation_text(const Explanation& e) {
                         u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit,
                         u.p_value);
     if (!u.place.empty()) text += fmt::format("    {}\n", place_in_words(u.place));
+    if (!u.times.empty())
+      text += fmt::format(
+          "    in proportion to how far {0} is from its mean; drawn as it is where {0} is farthest\n",
+          u.times);
     if (u.levels) text += wrapped("  " + levels_in_words(u, unit));
     if (!u.instead_of.empty())
       text += fmt::format("    in which it bends away from the formula of {}\n", joined(u.instead_of));

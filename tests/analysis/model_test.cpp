@@ -157,6 +157,35 @@ TEST(ApplyModel, ACurveOfAPlaceIsWeightedByIt) {
               HasSubstr("goes with the place cellar, which this program does not know"));
 }
 
+TEST(ApplyModel, ACurveOfTwoConditionsIsWeightedByTheOther) {
+  ModelVersion model{.version = 1, .explanation = "{}"};
+  model.curves = {{.covariate = "clip",
+                   .shape = CurveShape::kStraight,
+                   .low = 0.1,
+                   .high = 0.4,
+                   .coefficients = {0.02},
+                   .centre = {0.5},
+                   .times = OtherCondition{"load", {.centre = 2, .scale = 4}, 0.1}}};
+  model.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-6);
+  CampaignData data = four_runs();
+  for (Run& run : data.runs) run.numbers["load"] = 3;
+  data.runs[1].numbers["load"] = 30;  // farther than any that the model has seen
+  data.runs[3].numbers.erase("load");
+  const ModelVersion read = model_from_json(model_json(model), "it");
+  EXPECT_EQ(model_json(read), model_json(model));
+  const Reduction reduction = corrected(data, read);
+  const auto change = [&](std::size_t run) {
+    return -std::log(reduction.runs[run].thrust_N[2] / *data.runs[run].thrust_N[2]) / 0.02;
+  };
+  EXPECT_NEAR(change(0), 0.25 * (-1 - 0.5) - 0.1, 1e-10);
+  EXPECT_NEAR(change(1), *data.runs[1].number("clip") / 0.15 - 5. / 3 - 0.5 - 0.1, 1e-10);
+  ASSERT_EQ(reduction.left_out.size(), 1u);
+  EXPECT_THAT(reduction.left_out[0].reason, HasSubstr("no load, which the adopted curve over clip × load"));
+  model.curves[0].times->strength.scale = 0;
+  EXPECT_THAT(message_of([&] { model_from_json(model_json(model), "it"); }),
+              HasSubstr("has a scale that is not above 0"));
+}
+
 TEST(ApplyModel, ARunWithoutTheCovariateIsLeftOutWithTheReason) {
   CampaignData data = four_runs();
   data.runs[1].numbers.erase("air_pressure_Pa");

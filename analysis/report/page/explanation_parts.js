@@ -122,9 +122,15 @@ const placeText = (place) => place === 'tunnel' ? ' in the tunnel, compared with
     place                                       ? ` in proportion to \`${place}\` of the location (amplitude: where that is 1)` :
                                                   '';
 
+/** What a slope that goes with another condition does. */
+const timesText = (times) => times ?
+    ` in proportion to how far \`${times}\` is from its mean (amplitude: where that is farthest)` :
+    '';
+
 const unknownText = (unknown, unit) => {
-  const {covariate, place, rotor, amplitude, p_value: p, instead_of: insteadOf = []} = unknown;
-  return `Depends on \`${covariate}\`${rotor ? ` at rotor ${rotor}` : ''}${placeText(place)}: amplitude ${digits(amplitude)}${
+  const {covariate, place, times, rotor, amplitude, p_value: p, instead_of: insteadOf = []} = unknown;
+  const where = `${rotor ? ` at rotor ${rotor}` : ''}${placeText(place)}${timesText(times)}`;
+  return `Depends on \`${covariate}\`${where}: amplitude ${digits(amplitude)}${
       unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${labelsText(unknown, unit)}${
       insteadOf.length ? ` It bends away from the formula of ${insteadOf.join(', ')}.` : ''}`;
 };

@@ -85,7 +85,7 @@ TEST_F(Places, OfOneSideOnlyAreNotTriedTwice) {
 TEST_F(Places, ATableHasNone) {
   Observations o = observations();
   o.places.clear();
-  for (const Curve& curve : curves_to_try(o, o.all_rows())) EXPECT_EQ(curve.place.name, "");
+  for (const Curve& curve : curves_to_try(o, o.all_rows())) EXPECT_EQ(curve.in_place(), "");
 }
 
 }  // namespace
