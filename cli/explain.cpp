@@ -80,9 +80,7 @@ int run_explain(ExplainOptions options) {
         "--adopt stores effects that the program has: add your own as a file first (docs/effects.md)");
   const Candidates candidates(options.effects);
   const Observations observations = observations_of_file(options);
-  const std::vector<Effect> axes = effects_of_other_axes(observations);
-  std::vector<const Effect*> effects = candidates.all;
-  for (const Effect& axis : axes) effects.push_back(&axis);
+  const TableEffects effects(observations, candidates.all);
   if (options.adopt) require_adoptable(observations);
   options.search.empirical = options.adopt_empirical;
   ProgressBar progress("explaining");
@@ -91,7 +89,7 @@ int run_explain(ExplainOptions options) {
     step += 1;
     progress.show(step, step + 3, what);
   };
-  const Explanation explanation = explain(observations, effects, options.search);
+  const Explanation explanation = explain(observations, effects.all, options.search);
   for (const std::string& warning : explanation.warnings) warn(warning);
   const std::string json = explanation_json(explanation);
   if (options.json == "-")

@@ -67,13 +67,12 @@ ObservationTable read_rows(const ImportVerbOptions& options) {
 }
 
 nlohmann::ordered_json column_json(const TableColumn& column) {
-  return {
-      {"column", column.column}, {"unit", unit_after_conversion(column.unit)}, {"meaning", column.meaning}};
+  return {{"column", column.column}, {"unit", column.kept_unit()}, {"meaning", column.meaning}};
 }
 
 /// "Tair [°C] as air_temperature_C", in the unit that it is kept in.
 std::string in_words(const TableColumn& column) {
-  const std::string_view unit = unit_after_conversion(column.unit);
+  const std::string_view unit = column.kept_unit();
   return column.column + (unit == "1" ? "" : fmt::format(" [{}]", unit)) +
          (column.meaning.empty() ? "" : " as " + column.meaning);
 }

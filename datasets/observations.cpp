@@ -10,12 +10,20 @@
 namespace tunnelrig {
 namespace {
 
+/// Of a column whose name says a unit that is not SI's; nullptr of others, and of units of another quantity.
+const Unit* unit_in_name(const TableColumn& column) {
+  const std::string& name = column.name();
+  if (name != "hours_in_session" && name != "tilt_deg") return nullptr;
+  const Unit& said = unit_from_name(name == "tilt_deg" ? "deg" : "h");
+  return said.quantity == unit_from_name(column.unit).quantity ? &said : nullptr;
+}
+
 /// Converts one cell; the column exists.
 std::optional<double> converted(const Sheet& sheet, std::size_t row, const TableColumn& column) {
   const auto value = sheet.number(row, column.column);
   if (!value) return {};
   const Unit& unit = unit_from_name(column.unit);
-  const double si = unit.convert(*value);
+  const double si = column.converted(*value);
   if (const auto rule = impossible(si, unit, column.meaning))
     throw InputError(fmt::format("{}: {:g}{}{} is {}", sheet.where(row, column.column), *value,
                                  column.unit == "1" ? "" : " ", column.unit == "1" ? "" : column.unit,
@@ -83,6 +91,16 @@ void restore_places(const CampaignFile& file, Sheet& sheet) {
 }
 
 }  // namespace
+
+std::string_view TableColumn::kept_unit() const {
+  const Unit* said = unit_in_name(*this);
+  return said == nullptr ? unit_after_conversion(unit) : said->name;
+}
+
+double TableColumn::converted(double value) const {
+  const Unit* said = unit_in_name(*this);
+  return unit_from_name(unit).convert(value) / (said == nullptr ? 1 : said->factor);
+}
 
 ObservationTable read_observations(const Sheet& sheet, const TableSchema& schema) {
   sheet.require(schema.response.column);

@@ -23,6 +23,10 @@ struct TableColumn {
                         // like any other
 
   const std::string& name() const { return meaning.empty() ? column : meaning; }
+  /// What values are in once converted: SI, but where the name says another unit (hours_in_session,
+  /// tilt_deg).
+  std::string_view kept_unit() const;
+  double converted(double value) const;
 };
 
 inline constexpr std::string_view kTableFormat = "tunnelrig-table/1";

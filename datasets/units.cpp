@@ -13,7 +13,7 @@ constexpr double kGravity = 9.80665;   // m/s², standard
 constexpr double kPound = 0.45359237;  // kg
 constexpr double kPi = std::numbers::pi;
 
-constexpr std::array<Unit, 63> kUnits = {{
+constexpr std::array<Unit, 65> kUnits = {{
     {"1", "number", 1, 0},
     {"", "number", 1, 0},
     {kTextUnit, "text", 1, 0},
@@ -58,6 +58,7 @@ constexpr std::array<Unit, 63> kUnits = {{
     {"mV/V", "voltage ratio", 1e-3, 0},
     {"uV/V", "voltage ratio", 1e-6, 0},
     {"µV/V", "voltage ratio", 1e-6, 0},
+    {"μV/V", "voltage ratio", 1e-6, 0},  // the Greek letter, where that above is the micro sign
     {"counts", "number", 1, 0},
     {"A", "current", 1, 0},
     {"W", "power", 1, 0},
@@ -65,6 +66,7 @@ constexpr std::array<Unit, 63> kUnits = {{
     {"ms", "time", 1e-3, 0},
     {"us", "time", 1e-6, 0},
     {"µs", "time", 1e-6, 0},
+    {"μs", "time", 1e-6, 0},
     {"min", "time", 60, 0},
     {"h", "time", 3600, 0},
     {"Hz", "frequency", 1, 0},

@@ -1,7 +1,9 @@
 #include "analysis/residual/explanation_parts.h"
+#include "datasets/error.h"
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -108,53 +110,17 @@ void report_adopted(const Observations& observations, const Attribution& found, 
   }
 }
 
-/// Where a step may lie as well, as far as the open runs tell.
-struct ChangePoint {
-  std::size_t term, parameter;
-  double low, high;  // 95 %
-};
-
-/// A step was sought among the open blocks: whether the sealed ones between them lie before or behind it, all
-/// runs tell.
-MeanModel with_change_points_of_all(const Observations& observations, MeanModel model,
-                                    const std::vector<int>& open, std::vector<ChangePoint>& result) {
-  constexpr double kHalfChiSquared = 1.92;  // 95 % of one degree of freedom, halved
-  const std::vector<int> rows = observations.all_rows();
-  for (std::size_t t = 0; t < model.terms.size(); ++t) {
-    const auto& parameters = model.terms[t].effect->parameters;
-    for (std::size_t k = 0; k < parameters.size(); ++k) {
-      if (parameters[k].role != ParameterRole::kChangePoint) continue;
-      const double found = model.terms[t].parameters[k];
-      const auto before = std::lower_bound(open.begin(), open.end(), static_cast<int>(found));
-      const int last = before == open.begin() ? -1 : *std::prev(before);
-      std::vector<std::pair<double, double>> likelihood;  // by first run
-      for (int row = last + 1; row <= static_cast<int>(found); ++row) {
-        const auto r = static_cast<std::size_t>(row);
-        if (row > 0 && observations.block[r] == observations.block[r - 1]) continue;
-        MeanModel moved = model;
-        moved.terms[t].parameters[k] = row;
-        likelihood.emplace_back(fit_jointly(observations, moved, rows).variances.log_likelihood, row);
-      }
-      if (likelihood.empty()) continue;
-      const auto [highest, best] = *std::max_element(likelihood.begin(), likelihood.end());
-      model.terms[t].parameters[k] = best;
-      ChangePoint point{t, k, best, best};
-      for (const auto& [value, row] : likelihood)
-        if (value > highest - kHalfChiSquared) {
-          point.low = std::min(point.low, row);
-          point.high = std::max(point.high, row);
-        }
-      result.push_back(point);
-    }
-  }
-  return model;
-}
-
 /// What the opened seal and the intervals say against what was adopted.
 void warn_of_doubts(Explanation& explanation) {
   constexpr double kFarAboveFloor = 1.25;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     const ParameterEstimate& amplitude = adopted.parameters[0];
+    for (const ParameterEstimate& parameter : adopted.parameters)
+      if (parameter.theory && (parameter.value < parameter.low || parameter.value > parameter.high))
+        explanation.warnings.push_back(fmt::format(
+            "{}: its {} is theory's {:.4g}, and the data alone say {:.4g} to {:.4g}: something else goes "
+            "with it",
+            adopted.term.label(), parameter.name, parameter.value, parameter.low, parameter.high));
     const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
     // Where groups have their own, these may be of either sign, and nothing on the whole.
     if (adopted.term.per_group ? std::ranges::all_of(amplitude.groups, holds_0) : holds_0(amplitude))
@@ -204,7 +170,9 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   }
 
   const Seal seal = seal_blocks(observations, settings.seed);
-  if (!seal.only_sealed.empty()) explanation.warnings.push_back(only_sealed_in_words(seal.only_sealed));
+  const bool own_baselines = observations.groups_within_blocks || !observations.held_out.empty();
+  if (!seal.only_sealed.empty() && !own_baselines)
+    explanation.warnings.push_back(only_sealed_in_words(seal.only_sealed));
   const Attribution found = attribute(observations, seal.open, effects, settings);
   const Observations& wide = found.observations;
   // What the baseline is held against: the same, without what groups have of their own.
@@ -212,6 +180,12 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   alone.scatter = wide.scatter;
   report_untestable(alone, effects, rows, explanation);
   warn_of_scatter(wide, explanation);
+  if (static_cast<int>(found.accepted.size()) >= settings.most_effects)
+    explanation.warnings.push_back(
+        fmt::format("the search ended with {} effects, as many as --max-effects allows: where there are "
+                    "more, these may be "
+                    "wrong; try more",
+                    found.accepted.size()));
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
   explanation.detectable = found.detectable_sigma * scale_of(observations);
@@ -226,12 +200,26 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
       explanation.empirical.push_back(found_curve.curve.label());
   if (!found.curves.empty() && !settings.empirical)
     named = found.accepted.empty() ? found.baseline : without_curves(found, seal.open);
-  const HeldOutErrors before = score(alone, found.baseline, named.variances, seal.open, seal.sealed);
-  const HeldOutErrors after = score(wide, named, named.variances, seal.open, seal.sealed);
+  const std::vector<int> astride = astride_of_steps(named.model, seal);
+  std::vector<int> scored;
+  std::set_difference(seal.sealed.begin(), seal.sealed.end(), astride.begin(), astride.end(),
+                      std::back_inserter(scored));
+  if (!astride.empty())
+    explanation.warnings.push_back(fmt::format(
+        "{} of the {} sealed runs lie where a step may be as well, so they are not scored: {} to {}",
+        astride.size(), seal.sealed.size(), observations.name[static_cast<std::size_t>(astride.front())],
+        observations.name[static_cast<std::size_t>(astride.back())]));
+  const HeldOutErrors before = score(alone, found.baseline, named.variances, seal.open, scored);
+  const HeldOutErrors after = score(wide, named, named.variances, seal.open, scored);
+  if (before.count() == 0)
+    throw InputError(
+        "no row that is held out can be scored: each stands alone in a group that has no other rows; hold "
+        "out "
+        "others");
   set_interval(observations, before, settings.seed, explanation.before);
   set_interval(observations, after, settings.seed, explanation.after);
   explanation.noise_floor =
-      rms(score(wide, found.final, found.final.variances, seal.open, seal.sealed).expected_std);
+      rms(score(wide, found.final, found.final.variances, seal.open, scored).expected_std);
   explanation.before.rmse = rms(residuals(alone, found.baseline, seal.open));
   explanation.after.rmse = rms(residuals(wide, named, seal.open));
 
@@ -256,6 +244,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
     estimate.run = observations.name[static_cast<std::size_t>(estimate.value)];
   }
   warn_of_doubts(explanation);
+  warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);
   for (const FoundCurve& curve : found.curves)
     explanation.unknown.push_back(describe(wide, whole, curve, rows));
   if (found.session_unknown && found.curves.empty())
@@ -321,14 +310,6 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
   return explanation;
 }
 
-/// F + x F_other, the other axis being a column of the table.
-struct OtherAxis {
-  template <class T>
-  T operator()(const Sample& s, const T* p, const T& force) const {
-    return force + p[0] * s.x[0];
-  }
-};
-
 }  // namespace
 
 Observations without_set_aside(const Observations& observations, const Explanation& explanation) {
@@ -336,26 +317,6 @@ Observations without_set_aside(const Observations& observations, const Explanati
   for (const SuspectRow& row : explanation.suspect_rows)
     if (row.set_aside) aside.push_back(row);
   return aside.empty() ? observations : observations.subset(rows_but(observations, aside));
-}
-
-std::vector<Effect> effects_of_other_axes(const Observations& observations) {
-  std::vector<Effect> effects;
-  for (const std::string& axis : observations.other_axes) {
-    const Covariate* load = observations.find(axis);
-    const bool same = load == nullptr || load->unit == observations.unit;
-    const std::string unit = same ? "1" : observations.unit + "/" + load->unit;
-    effects.push_back(make_effect<OtherAxis>({.name = "crosstalk",
-                                              .form = axis,
-                                              .formula = "F + x F_other",
-                                              .physics = "a load on another axis bends this one's spring",
-                                              .parameters = {{"coefficient", unit, -1e12, 1e12}},
-                                              .covariates = {axis},
-                                              .additive = true,
-                                              .sign_rule = "either",
-                                              .force_N = {},
-                                              .jet_N = {}}));
-  }
-  return effects;
 }
 
 Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,

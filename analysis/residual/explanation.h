@@ -71,6 +71,7 @@ struct Untestable {
 struct SuspectRow {
   std::string row;
   double studentised = 0;
+  bool apart = false;      // far from all others, with a gap between (suspects.cpp)
   bool set_aside = false;  // the model is found without it
 };
 
@@ -94,8 +95,19 @@ struct Explanation {
   Eigen::MatrixXd residual_before, residual_after;  // n × c, unit of the response
 };
 
-/// Crosstalk from a table's other axes, as candidates of their own.
-std::vector<Effect> effects_of_other_axes(const Observations& observations);
+/// The candidates as the data have them: in a table crosstalk from its other axes as well, and where the
+/// response is not in volts no bounds that are. A campaign's are as they came.
+class TableEffects {
+ public:
+  TableEffects(const Observations& observations, const std::vector<const Effect*>& effects);
+  TableEffects(const TableEffects&) = delete;  // `all` points into it
+  TableEffects& operator=(const TableEffects&) = delete;
+
+  std::vector<const Effect*> all;
+
+ private:
+  std::vector<Effect> own_;
+};
 
 /// The protocol: seal, search on the open runs, open the seal once, estimate on all.
 Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "analysis/residual/explanation.h"
+#include "analysis/residual/seal.h"
 
 namespace tunnelrig {
 
@@ -15,12 +16,33 @@ void report_untestable(const Observations& observations, const std::vector<const
 /// Conditions that change once and for all where an adopted step may be: another battery, other blades.
 void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation);
 
+/// Effects of the measured speed that take back a part of its square: noise of the reading does that as well.
+void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
+                         Explanation& explanation);
+
 /// What the search found of the runs' scatter and allowed for: a rotor with more of it, neighbours that
 /// resemble each other.
 void warn_of_scatter(const Observations& observations, Explanation& explanation);
 
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
+
+// --- change_points.cpp
+
+/// Where a step may lie as well, as far as all runs tell.
+struct ChangePoint {
+  std::size_t term, parameter;
+  double low, high;  // 95 %
+};
+
+/// A step was sought among the open blocks: which of the runs of those on either side, and of the sealed ones
+/// between them, lie behind it, all runs tell.
+MeanModel with_change_points_of_all(const Observations& observations, MeanModel model,
+                                    const std::vector<int>& open, std::vector<ChangePoint>& result);
+
+/// Sealed runs between the open ones on either side of a step, before or behind it: the open ones do not say
+/// which, so no model could predict them. Nothing where all are.
+std::vector<int> astride_of_steps(const MeanModel& model, const Seal& seal);
 
 // --- estimates.cpp
 

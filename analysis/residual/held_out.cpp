@@ -145,7 +145,7 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     }
     MatrixXd errors = Eigen::Map<const MatrixXd>(residual.data(), n, stratum.modes);
     MatrixXd variances = Eigen::Map<const MatrixXd>(variance.data(), n, stratum.modes);
-    if (stratum.means() && observations.groups_within_blocks)
+    if (stratum.means() && (observations.groups_within_blocks || !observations.held_out.empty()))
       own_baseline(observations, test_rows, Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes),
                    sigma2, errors, variances);
     parts.push_back(whitened(observations, test_rows, errors, null.sigma[s], kRatios[null.ratio[s]],

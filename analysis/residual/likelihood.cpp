@@ -262,6 +262,17 @@ struct CandidateScan::Impl {
     }
   }
 
+  /// By how much a candidate's evidence may grow with a smaller session variance, which has a part of the
+  /// candidate's work in it: of sessions that scatter little, hardly at all.
+  double most_hidden(std::size_t candidate, const State& null) const {
+    constexpr std::array<double, kRatios.size()> kMostHidden = {0, 0, 0, 0, 0.5, 1.5, 3, 6, 1e9};
+    double most = 0;
+    for (std::size_t s = 0; s < model.strata().size(); ++s)
+      if (model.strata()[s].means() && touches[candidate][s])
+        most = std::max(most, kMostHidden[null.ratio[s]]);
+    return most;
+  }
+
   CandidateFit fit_candidate(const Data& data, Index set, int candidate, const State& null,
                              double threshold) const {
     const auto i = static_cast<std::size_t>(candidate);
@@ -274,9 +285,9 @@ struct CandidateScan::Impl {
       const bool wrong_side = own == 1 && candidates[i].sign * s.amplitude(adopted) < 0;
       return wrong_side ? 0.0 : (*table_of[i])(ratio) + std::log10(candidates[i].weight);
     };
-    // A smaller session variance can only help a candidate that varies between sessions, and rarely by much:
-    // it is tried where it may decide.
-    if (evidence(state) > threshold) improve(data, set, candidate, state);
+    // A smaller session variance can only help a candidate that varies between sessions, and rarely by much
+    // unless it is large itself: it is tried where it may decide.
+    if (evidence(state) > threshold - most_hidden(i, null)) improve(data, set, candidate, state);
     result.likelihood_ratio = std::max(0.0, state.log_likelihood - null.log_likelihood);
     result.evidence = evidence(state);
     result.amplitude = state.amplitude.tail(own);

@@ -85,7 +85,7 @@ struct Observations {
   std::vector<bool> held_out;  // a table's hold_out expression; empty: seal blocks instead
   bool from_table = false, blocks_are_rows = false;
   bool coefficient = false;  // the response is a thrust coefficient, or is made one by its measured speed
-  bool bare_thrust = false;  // it is a thrust, and the baseline does not have the density of the air
+  bool of_air = false;       // it is a thrust, a coefficient, power or torque, without the density of the air
   bool groups_within_blocks =
       false;  // the block is the group: its baseline is estimated anew where it is held out
   RunScatter scatter;
@@ -100,6 +100,7 @@ struct Observations {
   std::map<std::string, std::string> not_usable;  // covariate: why (missing in some runs, constant, a text)
   std::vector<std::string> left_out;              // "run: reason"
 
+  bool line_of_cell = false;            // a linear baseline that is over what a cell is loaded with
   std::string baseline_over;            // covariate that a table's line or power law is over; or empty
   std::vector<std::string> other_axes;  // covariates of the same quantity as a linear baseline's column
 
@@ -108,8 +109,8 @@ struct Observations {
   int groups() const { return static_cast<int>(group_name.size()); }
   int blocks() const { return static_cast<int>(block_name.size()); }
   std::vector<int> all_rows() const;
-  /// v = b + g T of a cell: what it reads without a load is no force.
-  bool is_line() const { return baseline.starts_with("linear:"); }
+  /// v = b + g T of a cell: what it reads without a load is no force. A thrust over a condition has none.
+  bool is_line() const { return line_of_cell; }
   bool is_power_law() const { return baseline.starts_with("power:"); }
   const Covariate* find(std::string_view wanted) const {
     for (const Covariate& covariate : covariates)

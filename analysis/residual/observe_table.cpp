@@ -1,6 +1,7 @@
 #include "analysis/air.h"
 #include "analysis/residual/expression.h"
 #include "analysis/residual/observations.h"
+#include "analysis/residual/parts_of_equal_size.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -31,6 +32,12 @@ struct Source {
   double cell(Index r, const std::string& column) const {
     return table.sheet.number(rows[static_cast<std::size_t>(r)], column).value_or(kNaN);
   }
+  /// Throws InputError naming file, line and column where there is none.
+  std::vector<double> numbers(const std::string& column) const {
+    std::vector<double> result;
+    for (const std::size_t row : rows) result.push_back(table.sheet.require_number(row, column));
+    return result;
+  }
   std::vector<std::string> texts(const std::string& column) const {
     std::vector<std::string> result;
     for (const std::size_t row : rows) result.push_back(table.sheet.text(row, column));
@@ -38,7 +45,7 @@ struct Source {
   }
   double converted(Index r, const TableColumn& column) const {
     const double mechanical = column.column == table.schema.speed_column ? table.schema.speed_factor : 1;
-    return unit_from_name(column.unit).convert(cell(r, column.column)) * mechanical;
+    return column.converted(cell(r, column.column)) * mechanical;
   }
 };
 
@@ -86,8 +93,7 @@ void add_covariates(const Source& source, Observations& result) {
     if (column.unit == kTextUnit)
       result.covariates.push_back(covariate_of_texts(column.column, source.texts(column.column)));
     else if (column.column != result.response)  // which would explain itself
-      add(column.name(), unit_after_conversion(column.unit),
-          [&](Index r) { return source.converted(r, column); });
+      add(column.name(), column.kept_unit(), [&](Index r) { return source.converted(r, column); });
   if (schema.diameter_column || schema.diameter_m)
     add(
         "propeller_diameter_m", "m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); },
@@ -109,7 +115,8 @@ void set_response(const Source& source, const ObservationChoice& choice, Observa
   // C_T is what is constant where speed and diameter are known; a baseline in another column replaces that.
   const bool reduced = own && column.meaning == "thrust_N" && choice.baseline.empty() && schema.speed_column;
   result.coefficient = result.coefficient || reduced;
-  result.bare_thrust = own && column.meaning == "thrust_N" && !reduced;
+  const std::string_view quantity = unit_from_name(column.unit).quantity;
+  result.of_air = own && !reduced && (!column.meaning.empty() || quantity == "power" || quantity == "torque");
   for (Index r = 0; r < source.count(); ++r) {
     const Observation& row = source.row(r);
     result.value(r, 0) = source.converted(r, column);
@@ -141,6 +148,7 @@ std::optional<Index> of_other_sign(const Observations& result) {
 }
 
 /// Groups that pulled the other way are measured by magnitude; a response of both signs is kept as it is.
+/// Thrusts that scatter alike have an offset beside their C_T.
 void set_scale(Observations& result, bool alike) {
   result.multiplicative = !alike && !of_other_sign(result);
   if (result.multiplicative) {
@@ -149,6 +157,7 @@ void set_scale(Observations& result, bool alike) {
     result.y = (result.value.array() / result.known.array()).log();
   } else {
     result.y = result.value;
+    if ((result.known.array() != 1).any()) result.slopes = result.known;
     result.known.setOnes();
   }
 }
@@ -170,26 +179,14 @@ void as_schema_says(const TableSchema& schema, int line, const std::string& key,
   }
 }
 
-std::vector<int> binned(const Source& source, const Bins& bins) {
-  std::vector<std::size_t> order(source.rows.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::vector<double> value;
-  for (Index r = 0; r < source.count(); ++r)
-    value.push_back(source.table.sheet.require_number(source.rows[static_cast<std::size_t>(r)], bins.column));
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return value[a] < value[b]; });
-  std::vector<int> bin(order.size());
-  for (std::size_t k = 0; k < order.size(); ++k)
-    bin[order[k]] = static_cast<int>(k * static_cast<std::size_t>(bins.count) / order.size());
-  return bin;
-}
-
 void set_blocks(const Source& source, Observations& result) {
   const TableSchema& schema = source.table.schema;
   if (schema.bins) {
-    as_schema_says(schema, schema.blocks_line, "blocks", schema.blocks,
-                   [&] { result.block = binned(source, *schema.bins); });
-    for (int b = 0; b < schema.bins->count; ++b)
+    as_schema_says(schema, schema.blocks_line, "blocks", schema.blocks, [&] {
+      result.block = parts_of_equal_size(source.numbers(schema.bins->column), schema.bins->count);
+    });
+    const int count = *std::max_element(result.block.begin(), result.block.end()) + 1;
+    for (int b = 0; b < count; ++b)
       result.block_name.push_back(fmt::format("{} {}", schema.bins->column, b + 1));
     return;
   }
@@ -249,8 +246,8 @@ std::vector<bool> held_out_rows(const Source& source, const Observations& result
                            "this is {:g} here, neither true nor false; write a comparison", held);
     held_out.push_back(held != 0);
   }
-  const auto count = std::count(held_out.begin(), held_out.end(), true);
-  if (count == 0 || count == source.count()) throw InputError("this takes all rows or none");
+  if (const auto n = std::count(held_out.begin(), held_out.end(), true); n == 0 || n == source.count())
+    throw InputError("this takes all rows or none");
   return held_out;
 }
 
@@ -330,7 +327,6 @@ void set_previous(Observations& result) {
 /// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
 void set_baseline(const Source& source, const ObservationChoice& choice, Observations& result) {
   result.baseline = choice.baseline.empty() ? "constant" : choice.baseline;
-  result.slopes.resize(source.count(), 0);
   if (result.baseline == "constant") return;
   const auto colon = result.baseline.find(':');
   const std::string kind = result.baseline.substr(0, colon);
@@ -357,6 +353,10 @@ void set_baseline(const Source& source, const ObservationChoice& choice, Observa
     result.slopes(r, 0) = kind == "power" ? std::log(x) : x;
   }
   result.baseline_over = keep_as_covariate(source, column, result);
+  if (column == result.response)
+    throw InputError(fmt::format("--baseline {}: this is the response itself", result.baseline));
+  const std::string_view over = unit_from_name(described(source.table.schema, column).unit).quantity;
+  result.line_of_cell = kind == "linear" && (!result.of_air || over == "force" || over == "torque");
   if (kind == "linear") set_other_axes(source.table.schema, column, result);
 }
 
@@ -380,6 +380,7 @@ Observations observe_table(const ObservationTable& table, const ObservationChoic
   if (!(result.value.maxCoeff() > result.value.minCoeff()))
     throw InputError(fmt::format("the response {} is the same in every row: there is nothing to explain",
                                  result.response));
+  result.slopes.resize(source.count(), 0);
   set_scale(result, scatters_alike(table.schema, choice));
   add_covariates(source, result);
   set_previous(result);

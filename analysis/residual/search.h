@@ -27,7 +27,8 @@ class Search {
     std::vector<Candidate> candidates;
     std::vector<CandidateFit> fits;
     std::unique_ptr<CandidateScan> scan;
-    std::vector<std::size_t> order;  // by evidence, best first
+    std::vector<std::size_t> order;            // by evidence, best first
+    std::map<std::size_t, Term> partner = {};  // of ways that are two steps: the second
   };
 
   struct CurveScan {
@@ -75,8 +76,20 @@ class Search {
   std::size_t alike_instead(const Scan& scan, std::size_t i) const;
   bool groups_within_bounds(const Observations& wider, const MeanModel& model) const;
   bool another_does_as_well(const CrossValidation& own, const NullFit& variances) const;
+  /// Whether it is one of the measured speed, of which the model does not have the square.
+  bool lacks_speed_squared(const Term& term) const;
+  /// The effect of the same condition and rotors that the model's newest term takes back: both are several
+  /// times what they make together, which is a shape and no two causes.
+  std::optional<std::string> cancelled_by(const MeanModel& model) const;
+  /// Of a term that is a step, counted from the newest (1): from the run on, of the sessions on either side,
+  /// where it is likeliest.
+  JointFit at_best_run(JointFit fit, std::size_t from_newest) const;
+  /// Two steps of two rotors at one run, of which neither can be seen alone: search_pairs.cpp
+  void add_pairs_of_steps(Scan& scan) const;
+  bool accept_pair(const Scan& scan, std::size_t i, double p);
   /// Whether a course that is straight or bends once over the order of runs does as well as the step.
-  bool is_gradual(const Term& step, const NullFit& variances, const CrossValidation& with_step) const;
+  bool is_gradual(const std::vector<Term>& steps, const NullFit& variances,
+                  const CrossValidation& with_steps) const;
   /// Of the runs' means within the fit, and its degrees of freedom.
   std::pair<double, double> sum_of_squares(const Observations& observations, const JointFit& fit) const;
   /// A joint fit with one term more; theory's coefficient where the data do not speak against it.
@@ -129,7 +142,9 @@ class Search {
   /// What an effect goes by: its covariates; with `power:COLUMN` that column for a function of the force
   /// alone, because a bend there is as likely the law's as the cell's.
   std::vector<std::string> conditions_of(const Effect& effect) const;
-  /// Whether a curve does all that an effect's only condition does, so that a name beside it means nothing.
+  /// Of what an effect makes of its conditions, the share that does not go with what the curve is over.
+  double share_beside(const Curve& curve, const Term& term) const;
+  /// Whether a curve does nearly all that an effect's conditions do, so that a name beside it means nothing.
   bool is_work_of_a_curve(const Term& term) const;
   /// Effects whose own covariate bends away from their formula give way to a curve.
   void doubt_formulas();

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -219,17 +220,36 @@ std::vector<std::string> Search::conditions_of(const Effect& effect) const {
   return {observations_.baseline_over};
 }
 
+double Search::share_beside(const Curve& curve, const Term& term) const {
+  constexpr int kDegree = 3;
+  const Eigen::Index channel = std::max(term.rotor, 0), of_curve = curve.x.cols() > 1 ? channel : 0;
+  const Eigen::VectorXd x = curve.x(rows_, of_curve).array() - curve.x.col(of_curve).mean();
+  Eigen::MatrixXd powers(x.size(), kDegree + 1);  // and what the term makes of its conditions
+  for (int k = 0; k < kDegree; ++k) powers.col(k) = (x / x.cwiseAbs().maxCoeff()).array().pow(k + 1);
+  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+  powers.col(kDegree) = respond(term, observations_, predicted).derivative[0][0](rows_, channel);
+  std::map<int, std::vector<Eigen::Index>> groups;
+  for (std::size_t r = 0; r < rows_.size(); ++r)
+    groups[observations_.group[static_cast<std::size_t>(rows_[r])]].push_back(static_cast<Eigen::Index>(r));
+  for (const auto& [group, members] : groups) {
+    const Eigen::MatrixXd own = powers(members, Eigen::all);
+    powers(members, Eigen::all) = own.rowwise() - own.colwise().mean();
+  }
+  const Eigen::VectorXd column = powers.col(kDegree);
+  const Eigen::VectorXd left =
+      column -
+      powers.leftCols(kDegree) * powers.leftCols(kDegree).completeOrthogonalDecomposition().solve(column);
+  return column.squaredNorm() > 0 ? left.squaredNorm() / column.squaredNorm() : 0;
+}
+
 bool Search::is_work_of_a_curve(const Term& term) const {
+  constexpr double kLittle = 0.1;  // of its variance
   const auto names = conditions_of(*term.effect);
   return !term.per_group &&
          std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
-           const auto varies_beside_it = [&](const std::string& name) {
-             const Covariate* other = is_over(found.curve, {name}) ? nullptr : observations_.find(name);
-             return other != nullptr && !observations_.not_usable.contains(name) &&
-                    other->value.maxCoeff() > other->value.minCoeff();
-           };
            return found.curve.everywhere() && found.curve.tilt.empty() && found.curve.rotor == term.rotor &&
-                  is_over(found.curve, names) && std::none_of(names.begin(), names.end(), varies_beside_it);
+                  found.curve.x.size() > 0 && is_over(found.curve, names) &&
+                  share_beside(found.curve, term) < kLittle;
          });
 }
 

@@ -47,7 +47,7 @@ bool Search::already_in(const Term& way, const MeanModel& model) {
   return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
     const bool another_axis = way.effect->name == "crosstalk" && term.effect != way.effect;
     return !another_axis && term.effect->name == way.effect->name &&
-           (term.rotor == way.rotor || term.rotor < 0 || way.rotor < 0) && term.other == way.other &&
+           (term.rotor == way.rotor || way.rotor < 0) && term.other == way.other &&
            !way.effect->has_change_point();
   });
 }
@@ -146,6 +146,13 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
                                                 fit_.linear.columns, fit_.variances, rows_);
   for (const std::size_t best : scan.order) {
     if (scan.fits[best].evidence < critical_) break;
+    if (scan.partner.contains(best)) {
+      if (!accept_pair(scan, best, maxima.p(scan.fits[best].evidence))) continue;
+      const auto newest = result_.accepted.end();
+      round.outcome +=
+          fmt::format("accepted {} and {}", (newest - 2)->term.label(), (newest - 1)->term.label());
+      return true;
+    }
     if (std::find(refused.begin(), refused.end(), scan.ways[best].effect) != refused.end()) continue;
     refused.push_back(scan.ways[best].effect);
     const std::size_t i = alike_instead(scan, best);
@@ -181,11 +188,19 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
       round.outcome += fmt::format("{} does not predict unseen blocks; ", term.label());
       continue;
     }
+    if (lacks_speed_squared(term)) {
+      round.outcome += fmt::format("{} without rotor_speed is no way of the speed; ", term.label());
+      continue;
+    }
+    if (const auto other = cancelled_by(fit.model)) {
+      round.outcome += fmt::format("{} and {} would cancel each other; ", term.label(), *other);
+      continue;
+    }
     if (const auto shared = only_bends(term, fit.variances, after)) {
       round.outcome += fmt::format("{} is no more than a bend over {}; ", term.label(), *shared);
       continue;
     }
-    if (term.effect->has_change_point() && is_gradual(term, fit.variances, after)) {
+    if (term.effect->has_change_point() && is_gradual({term}, fit.variances, after)) {
       round.outcome += fmt::format("{} is no better than a gradual change; ", term.label());
       continue;
     }
@@ -193,50 +208,11 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
                                 .p = maxima.p(scan.fits[i].evidence),
                                 .gain = before.rmse() - after.rmse(),
                                 .confounded = {}});
-    fit_ = std::move(fit);
+    fit_ = at_best_run(std::move(fit), 1);
     read_back_terms();
     let_groups_differ(true);
     round.outcome += "accepted " + result_.accepted.back().term.label();
     return true;
-  }
-  return false;
-}
-
-std::optional<std::string> Search::only_bends(const Term& term, const NullFit& variances,
-                                              const CrossValidation& with_term) const {
-  for (const Curve& curve : curves_) {
-    const auto shares = [&](const Accepted& other) {
-      return is_over(curve, conditions_of(*other.term.effect)) &&
-             (other.term.rotor < 0 || other.term.rotor == term.rotor);
-    };
-    if (!is_bend_over(curve, conditions_of(*term.effect), term.rotor) ||
-        std::none_of(result_.accepted.begin(), result_.accepted.end(), shares))
-      continue;
-    std::vector<Components> columns = fit_.linear.columns;
-    columns.push_back(without_trend(curve, rows_).columns[0]);
-    const CrossValidation with_bend =
-        cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
-    if (!compare(with_bend, with_term).told_apart()) return curve.covariate;
-  }
-  return {};
-}
-
-bool Search::is_gradual(const Term& step, const NullFit& variances, const CrossValidation& with_step) const {
-  Term always = step;
-  for (std::size_t k = 0; k < step.parameters.size(); ++k)
-    if (step.effect->parameters[k].role == ParameterRole::kChangePoint) always.parameters[k] = 0;
-  const Components after =
-      respond(always, observations_, predict_response(observations_, fit_.model, rows_)).derivative[0];
-  std::vector<Components> columns = fit_.linear.columns;
-  const double half = static_cast<double>(observations_.rows() - 1) / 2;
-  for (const int power : {1, 2}) {
-    columns.push_back(after);
-    for (Eigen::MatrixXd& component : columns.back())
-      for (Index row = 0; row < component.rows(); ++row)
-        component.row(row) *= std::pow(static_cast<double>(row) / half - 1, power);
-    const CrossValidation with_trend =
-        cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
-    if (compare(with_trend, with_step).mean <= 0) return true;
   }
   return false;
 }

@@ -18,6 +18,8 @@ using Eigen::VectorXd;
 constexpr double kBeyond = 0.5;                    // of a condition's range, on either side of what was seen
 constexpr double kSlowest = 0.6, kFastest = 1.15;  // of the usual speed
 constexpr std::size_t kMostConditions = 5;
+constexpr double kTold = 3,
+                 kMostPairs = 100;  // a difference of so many σ tells; nobody makes more pairs of runs
 
 /// A run that could be made: a place, and what differs there from an ordinary run.
 struct Setting {
@@ -160,8 +162,10 @@ std::string in_words(const SeparatingRun& run, const Observations& observations)
     const std::string unit = covariate == nullptr || covariate->unit == "1" ? "" : covariate->unit;
     text += fmt::format(", {} = {:.4g}{}{}", name, value, unit.empty() ? "" : " ", unit);
   }
-  return text + fmt::format(", beside an ordinary one there: the predictions differ by {:.1f} σ",
-                            run.expected_sigma);
+  text +=
+      fmt::format(", beside an ordinary one there: the predictions differ by {:.1f} σ", run.expected_sigma);
+  const double pairs = std::ceil(std::pow(kTold / run.expected_sigma, 2));
+  return pairs > 1 ? text + fmt::format(", so {:.0f} such pairs tell at {:.0f} σ", pairs, kTold) : text;
 }
 
 }  // namespace
@@ -190,7 +194,7 @@ std::optional<SeparatingRun> separating_run(const Observations& observations, co
     for (const auto& [name, value] : settings[s].covariates)
       if (value != settings[ordinary[s]].covariates.at(name)) best.setting[name] = value;
   }
-  if (!(best.expected_sigma > 0)) return {};
+  if (!(best.expected_sigma >= kTold / std::sqrt(kMostPairs))) return {};
   best.text = in_words(best, observations);
   return best;
 }

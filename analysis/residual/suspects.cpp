@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <map>
 #include <numeric>
 
 namespace tunnelrig {
@@ -43,6 +45,34 @@ VectorXd variance_of_a_run(const Observations& observations, const NullFit& vari
   return result;
 }
 
+/// Several gross rows hide each other in the variance: of n rows, k alike are hardly beyond √(n/k) of it. But
+/// they lie apart. Scaled residuals of a table's rows, each from its group's median, in σ by the median size
+/// of all, where these are the farthest (at most one of ten): beyond 10, and twice as far as the next; 0
+/// elsewhere. The tails of a distribution, or of a group that scatters more, have no such gap.
+VectorXd distance_of_those_apart(const Observations& observations, const std::vector<int>& rows,
+                                 const VectorXd& residual) {
+  constexpr double kFar = 10, kGap = 2, kMedianOfNormal = 0.6745;
+  constexpr std::size_t kFewestOfGroup = 5, kRowsPerGross = 10;
+  std::map<int, std::vector<Index>> groups;
+  for (Index r = 0; r < residual.size(); ++r)
+    if (std::isfinite(residual(r)))
+      groups[observations.group[static_cast<std::size_t>(rows[static_cast<std::size_t>(r)])]].push_back(r);
+  VectorXd away = VectorXd::Zero(residual.size());
+  for (const auto& [group, members] : groups) {
+    const VectorXd own = residual(members);
+    away(members) =
+        own.array() - (members.size() < kFewestOfGroup ? 0 : upper_median({own.begin(), own.end()}));
+  }
+  const VectorXd size = away.cwiseAbs();
+  const double sigma = upper_median({size.begin(), size.end()}) / kMedianOfNormal;
+  std::vector<double> sorted(size.begin(), size.end());
+  std::sort(sorted.begin(), sorted.end(), std::greater<>());
+  for (std::size_t k = sorted.size() / kRowsPerGross; sigma > 0 && k > 0; --k)
+    if (sorted[k - 1] > kFar * sigma && sorted[k - 1] >= kGap * sorted[k])
+      return (size.array() >= sorted[k - 1]).select(away / sigma, 0);
+  return VectorXd::Zero(residual.size());
+}
+
 }  // namespace
 
 std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
@@ -66,9 +96,11 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
   const double variance = missing.select(0, residual).squaredNorm() / missing.select(0, left).sum();
   const double limit = student_t_quantile(
       1 - 0.005 / static_cast<double>(std::max<Index>(1, residual.size())), std::max(dof - 1, 1.0));
+  VectorXd apart = VectorXd::Zero(residual.rows());
+  if (observations.from_table) apart = distance_of_those_apart(observations, errors.rows, residual.col(0));
   std::vector<SuspectRow> result;
   for (Index r = 0; r < residual.rows(); ++r) {
-    double worst = 0;
+    double worst = apart(r);
     for (Index c = 0; c < residual.cols(); ++c) {
       if (std::isnan(residual(r, c)) || !(variance > 0)) continue;
       const double inner = residual(r, c) / std::sqrt(variance * left(r, c));
@@ -77,7 +109,9 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
     }
     if (std::abs(worst) > limit)
       result.push_back(
-          {observations.name[static_cast<std::size_t>(errors.rows[static_cast<std::size_t>(r)])], worst});
+          {.row = observations.name[static_cast<std::size_t>(errors.rows[static_cast<std::size_t>(r)])],
+           .studentised = worst,
+           .apart = apart(r) != 0});
   }
   std::sort(result.begin(), result.end(), [](const SuspectRow& a, const SuspectRow& b) {
     return std::abs(a.studentised) > std::abs(b.studentised);
@@ -145,7 +179,7 @@ std::vector<SuspectRow> gross_rows(const Observations& observations,
   const double beyond_heavy_tails = observations.from_table ? 10 : 20;
   std::vector<SuspectRow> result;
   for (const SuspectRow& row : suspects)
-    if (std::abs(row.studentised) > beyond_heavy_tails) result.push_back(row);
+    if (row.apart || std::abs(row.studentised) > beyond_heavy_tails) result.push_back(row);
   return result;
 }
 

@@ -244,10 +244,10 @@ Testability testability(const Effect& effect, const Observations& observations) 
   if ((effect.name == "air_temperature" || effect.name == "temperature_gradient") &&
       observations.assumed.contains("air_temperature_C"))
     result.missing.emplace_back("air_temperature_C");
-  else if (effect.name == "air_temperature" && !observations.bare_thrust)
+  else if (effect.name == "air_temperature" && (!observations.of_air || observations.is_line()))
     result.reason =
-        "only a table's thrust (meaning = \"thrust_N\") is held against a baseline without the density of "
-        "its air";
+        "only a table's thrust, coefficient, power or torque is held against a baseline without the density "
+        "of its air";
   if (effect.scope == EffectScope::kPair && observations.channels() < 2)
     result.reason = "the response has one channel";
   if (effect.tunnel_only &&

@@ -82,7 +82,7 @@ TEST(TableUnits, ACrosstalkCoefficientIsOfTheTwoUnits) {
     const Observations o =
         observe_table(read_observations(parse_csv(csv, "t.csv"), parse_table_schema(schema, "s.toml")),
                       {.baseline = "linear:n"});
-    return effects_of_other_axes(o).at(0).parameters.at(0).unit;
+    return TableEffects(o, {}).all.at(0)->parameters.at(0).unit;
   };
   EXPECT_EQ(coefficient("gf"), "1");
   EXPECT_EQ(coefficient("mV"), "V/N");

@@ -236,53 +236,5 @@ TEST_F(TablesTest, CurvesDoNotSwingInAGap) {
   EXPECT_EQ(most, 2u);
 }
 
-/// Runs of four rotors in 16 sessions, with their order as a condition.
-Observations ordered(std::mt19937_64& random) {
-  Observations o = test::simulate(
-      {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .sigma = 0.002, .session_ratio = 0.1},
-      random);
-  Covariate order{"run_order", Eigen::VectorXd::LinSpaced(o.rows(), 0, static_cast<double>(o.rows() - 1)),
-                  true};
-  o.covariates.push_back(order);
-  return o;
-}
-
-TEST_F(TablesTest, AGradualChangeIsNoStep) {
-  Observations o = ordered(random);
-  Eigen::MatrixXd y = o.y;
-  for (Eigen::Index row = 0; row < y.rows(); ++row)
-    y.row(row).array() -= 0.012 * std::pow(static_cast<double>(row) / static_cast<double>(y.rows()), 2.5);
-  test::set_y(o, y);
-  const Explanation e = explained(o);
-  EXPECT_EQ(names(e), "");
-  EXPECT_EQ(e.verdict, "unknown");
-}
-
-/// The search never sees the session in which the propeller was nicked; the final fit does.
-TEST_F(TablesTest, AStepInASealedSessionIsPlacedThere) {
-  Observations o = ordered(random);
-  const Seal seal = seal_blocks(o, SearchSettings{}.seed);
-  int first = -1;
-  for (const int row : seal.sealed) {
-    const int block = o.block[static_cast<std::size_t>(row)];
-    const bool start = o.block[static_cast<std::size_t>(row - (row > 0 ? 1 : 0))] != block;
-    if (start && block >= 5 && block <= 10) first = row;
-  }
-  ASSERT_GE(first, 0);
-  Eigen::MatrixXd y = o.y;
-  for (Eigen::Index row = first; row < y.rows(); ++row) y(row, 1) -= 0.008;
-  test::set_y(o, y);
-  const Explanation e = explained(o);
-  ASSERT_EQ(e.adopted.size(), 1u) << names(e);
-  EXPECT_EQ(e.adopted[0].term.rotor, 1);
-  EXPECT_TRUE(e.adopted[0].term.effect->has_change_point());
-  const ParameterEstimate& run = e.adopted[0].parameters[1];
-  EXPECT_EQ(run.value, first);
-  EXPECT_EQ(run.run, o.name[static_cast<std::size_t>(first)]);
-  EXPECT_THAT(explanation_text(e), HasSubstr(run.run));
-  EXPECT_LE(run.low, first);
-  EXPECT_GE(run.high, first);
-}
-
 }  // namespace
 }  // namespace tunnelrig

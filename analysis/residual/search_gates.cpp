@@ -1,0 +1,106 @@
+// What a candidate beyond chance must not be, to get its name.
+#include "analysis/residual/search.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+
+/// The baseline has the nominal speed, so what the measured speed does begins with its square. A weaker
+/// dependence without it is a reading that scatters, or something else.
+bool Search::lacks_speed_squared(const Term& term) const {
+  const auto& covariates = term.effect->covariates;
+  const bool of_speed = std::find(covariates.begin(), covariates.end(), "speed_rpm") != covariates.end();
+  return !observations_.from_table && of_speed && term.effect->name != "rotor_speed" &&
+         std::none_of(result_.accepted.begin(), result_.accepted.end(),
+                      [](const Accepted& accepted) { return accepted.term.effect->name == "rotor_speed"; });
+}
+
+std::optional<std::string> Search::cancelled_by(const MeanModel& model) const {
+  constexpr double kMost = 2;
+  const Term& newest = model.terms.back();
+  if (newest.per_group) return {};
+  const Eigen::MatrixXd predicted = predict_response(observations_, model, rows_);
+  const auto made_by = [&](const Term& term) { return respond(term, observations_, predicted).value[0]; };
+  const auto names = conditions_of(*newest.effect);
+  for (auto other = model.terms.begin(); other + 1 != model.terms.end(); ++other) {
+    const auto theirs = conditions_of(*other->effect);
+    const bool shared = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+      return std::find(theirs.begin(), theirs.end(), name) != theirs.end();
+    });
+    if (!shared || other->per_group || other->rotor != newest.rotor) continue;
+    const Eigen::MatrixXd one = made_by(newest), two = made_by(*other);
+    if (std::min(rms_of(one), rms_of(two)) > kMost * rms_of(one + two)) return other->label();
+  }
+  return {};
+}
+
+std::optional<std::string> Search::only_bends(const Term& term, const NullFit& variances,
+                                              const CrossValidation& with_term) const {
+  for (const Curve& curve : curves_) {
+    const auto shares = [&](const Accepted& other) {
+      return is_over(curve, conditions_of(*other.term.effect)) &&
+             (other.term.rotor < 0 || other.term.rotor == term.rotor);
+    };
+    if (!is_bend_over(curve, conditions_of(*term.effect), term.rotor) ||
+        std::none_of(result_.accepted.begin(), result_.accepted.end(), shares))
+      continue;
+    std::vector<Components> columns = fit_.linear.columns;
+    columns.push_back(without_trend(curve, rows_).columns[0]);
+    const CrossValidation with_bend =
+        cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
+    if (!compare(with_bend, with_term).told_apart()) return curve.covariate;
+  }
+  return {};
+}
+
+bool Search::is_gradual(const std::vector<Term>& steps, const NullFit& variances,
+                        const CrossValidation& with_steps) const {
+  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+  std::vector<Components> always;  // of each step, as if it had been from the first run on
+  for (Term step : steps) {
+    for (std::size_t k = 0; k < step.parameters.size(); ++k)
+      if (step.effect->parameters[k].role == ParameterRole::kChangePoint) step.parameters[k] = 0;
+    always.push_back(respond(step, observations_, predicted).derivative[0]);
+  }
+  std::vector<Components> columns = fit_.linear.columns;
+  const double half = static_cast<double>(observations_.rows() - 1) / 2;
+  for (const int power : {1, 2}) {
+    for (const Components& after : always) {
+      columns.push_back(after);
+      for (Eigen::MatrixXd& component : columns.back())
+        for (Index row = 0; row < component.rows(); ++row)
+          component.row(row) *= std::pow(static_cast<double>(row) / half - 1, power);
+    }
+    const CrossValidation with_trend =
+        cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
+    if (compare(with_trend, with_steps).mean <= 0) return true;
+  }
+  return false;
+}
+
+JointFit Search::at_best_run(JointFit fit, std::size_t from_newest) const {
+  if (observations_.from_table) return fit;  // whose blocks need not be in order
+  const std::size_t t = fit.model.terms.size() - from_newest;
+  const auto& parameters = fit.model.terms[t].effect->parameters;
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    if (parameters[k].role != ParameterRole::kChangePoint) continue;
+    const auto found =
+        std::lower_bound(rows_.begin(), rows_.end(), static_cast<int>(fit.model.terms[t].parameters[k]));
+    if (found == rows_.begin() || found == rows_.end()) continue;
+    const auto block = [&](int row) { return observations_.block[static_cast<std::size_t>(row)]; };
+    const int before = block(*std::prev(found)), behind = block(*found);
+    for (const int row : rows_) {
+      if (block(row) != before && block(row) != behind) continue;
+      MeanModel moved = fit.model;
+      moved.terms[t].parameters[k] = row;
+      JointFit there = fit_jointly(observations_, moved, rows_);
+      if (there.variances.log_likelihood > fit.variances.log_likelihood) fit = std::move(there);
+    }
+  }
+  return fit;
+}
+
+}  // namespace tunnelrig

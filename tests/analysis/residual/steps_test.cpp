@@ -1,0 +1,130 @@
+// Steps: where they are, and what is none.
+#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/simulated.h"
+#include "support/seeds.h"
+
+#include <gmock/gmock.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using test::explained;
+using testing::Contains;
+using testing::HasSubstr;
+
+struct Steps : testing::Test {
+  std::mt19937_64 random{test::seed()};
+
+  /// Runs of four rotors in 16 sessions, with their order as a condition.
+  Observations ordered() {
+    Observations o = test::simulate(
+        {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .sigma = 0.002, .session_ratio = 0.1},
+        random);
+    Covariate order{"run_order", Eigen::VectorXd::LinSpaced(o.rows(), 0, static_cast<double>(o.rows() - 1)),
+                    true};
+    o.covariates.push_back(order);
+    return o;
+  }
+
+  static std::string names(const Explanation& e) {
+    std::string all;
+    for (const AdoptedEffect& adopted : e.adopted) all += adopted.term.label() + "; ";
+    return all;
+  }
+
+  /// In y, from a run on.
+  static void step(Observations& o, Index first, Index rotor, double size) {
+    MatrixXd y = o.y;
+    y.bottomRows(y.rows() - first).col(rotor).array() += size;
+    test::set_y(o, y);
+  }
+};
+
+TEST_F(Steps, AGradualChangeIsNoStep) {
+  Observations o = ordered();
+  Eigen::MatrixXd y = o.y;
+  for (Eigen::Index row = 0; row < y.rows(); ++row)
+    y.row(row).array() -= 0.012 * std::pow(static_cast<double>(row) / static_cast<double>(y.rows()), 2.5);
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  EXPECT_EQ(names(e), "");
+  EXPECT_EQ(e.verdict, "unknown");
+}
+
+/// The search never sees the session in which the propeller was nicked; the final fit does.
+TEST_F(Steps, AStepInASealedSessionIsPlacedThere) {
+  Observations o = ordered();
+  const Seal seal = seal_blocks(o, SearchSettings{}.seed);
+  int first = -1;
+  for (const int row : seal.sealed) {
+    const int block = o.block[static_cast<std::size_t>(row)];
+    const bool start = o.block[static_cast<std::size_t>(row - (row > 0 ? 1 : 0))] != block;
+    if (start && block >= 5 && block <= 10) first = row;
+  }
+  ASSERT_GE(first, 0);
+  Eigen::MatrixXd y = o.y;
+  for (Eigen::Index row = first; row < y.rows(); ++row) y(row, 1) -= 0.008;
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.adopted.size(), 1u) << names(e);
+  EXPECT_EQ(e.adopted[0].term.rotor, 1);
+  EXPECT_TRUE(e.adopted[0].term.effect->has_change_point());
+  const ParameterEstimate& run = e.adopted[0].parameters[1];
+  EXPECT_EQ(run.value, first);
+  EXPECT_EQ(run.run, o.name[static_cast<std::size_t>(first)]);
+  EXPECT_THAT(explanation_text(e), HasSubstr(run.run));
+  EXPECT_LE(run.low, first);
+  EXPECT_GE(run.high, first);
+}
+
+/// Two propellers exchanged at once, one for a better and one for a worse: what one makes hides in the
+/// variance of the sessions as long as the other is there.
+TEST_F(Steps, TwoThatAreOppositeAreBothFound) {
+  for (const double size : {0.01, 0.03}) {
+    Observations o = ordered();
+    step(o, 64, 2, size);
+    step(o, 64, 1, -size);
+    const Explanation e = explained(o);
+    ASSERT_EQ(e.adopted.size(), 2u) << names(e) << size;
+    for (const AdoptedEffect& adopted : e.adopted) {
+      EXPECT_TRUE(adopted.term.effect->has_change_point());
+      EXPECT_TRUE(adopted.term.rotor == 1 || adopted.term.rotor == 2) << names(e);
+    }
+    EXPECT_LT(e.after.held_out_rmse, 1.4 * e.noise_floor);
+  }
+}
+
+/// At a run in the midst of a session, not at the session's first.
+TEST_F(Steps, OneInTheMidstOfASessionIsPlacedThere) {
+  Observations o = ordered();
+  const Index first = 68;
+  step(o, first, 2, 0.012);
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.adopted.size(), 1u) << names(e);
+  const ParameterEstimate& run = e.adopted[0].parameters[1];
+  EXPECT_NEAR(run.value, static_cast<double>(first), 1);
+  EXPECT_LE(run.low, static_cast<double>(first));
+  EXPECT_GE(run.high, static_cast<double>(first));
+  EXPECT_TRUE(e.unknown.empty());
+}
+
+/// No model of the open runs can know on which side of the step a sealed session between them lies.
+TEST_F(Steps, SealedRunsWhereItMayLieAreNotScored) {
+  Observations o = ordered();
+  const Seal seal = seal_blocks(o, SearchSettings{}.seed);
+  Index first = -1;
+  for (const int row : seal.sealed)
+    if (row % 8 == 0 && row / 8 >= 5 && row / 8 <= 10) first = row;
+  ASSERT_GE(first, 0);
+  for (Index rotor = 0; rotor < 4; ++rotor) step(o, first, rotor, 0.02);
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.adopted.size(), 1u) << names(e);
+  EXPECT_THAT(e.warnings, Contains(HasSubstr("not scored: " + o.name[static_cast<std::size_t>(first)])));
+  EXPECT_LT(e.after.held_out_rmse, 1.4 * e.noise_floor);
+}
+
+}  // namespace
+}  // namespace tunnelrig
