@@ -34,7 +34,7 @@ struct Sample {
 enum class ParameterRole {
   kAmplitude,    // the first one; 0 means that the effect is absent
   kShape,        // a time constant or length: tried on a grid, then refined
-  kChangePoint,  // a run's number: tried at every run that leaves enough sessions on both sides
+  kChangePoint,  // a run's number: tried at the first of each session that leaves enough on both sides
 };
 
 struct EffectParameter {

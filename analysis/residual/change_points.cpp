@@ -7,17 +7,25 @@
 namespace tunnelrig {
 namespace {
 
-/// First runs of a step that was found behind open run `last` and at open run `found`: those of both runs'
-/// sessions and of what lies between. Of a table, whose blocks need not be in order, the first rows of blocks
-/// in between.
-std::vector<int> candidates(const Observations& observations, int last, int found) {
+/// First runs of a step that was found at run `found`: those of its session, of the open ones on either side,
+/// and of what lies between. Of a table, whose blocks need not be in order, the first rows of blocks since
+/// the open row before.
+std::vector<int> candidates(const Observations& observations, const std::vector<int>& open, int found) {
   const auto block = [&](int row) { return observations.block[static_cast<std::size_t>(row)]; };
+  const auto at = std::lower_bound(open.begin(), open.end(), found);
   std::vector<int> result;
-  for (int row = 1; row < static_cast<int>(observations.rows()); ++row) {
-    const bool between = row > last && row <= found;
-    const bool near = between || block(row) == block(found) || (last >= 0 && block(row) == block(last));
-    if (observations.from_table ? between && block(row) != block(row - 1) : near) result.push_back(row);
+  if (observations.from_table) {
+    for (int row = at == open.begin() ? 1 : *std::prev(at) + 1; row <= found; ++row)
+      if (block(row) != block(row - 1)) result.push_back(row);
+    return result;
   }
+  const auto elsewhere = [&](int row) { return block(row) != block(found); };
+  const auto before = std::find_if(std::make_reverse_iterator(at), open.rend(), elsewhere);
+  const auto behind = std::find_if(at, open.end(), elsewhere);
+  const int first = before == open.rend() ? block(found) : block(*before),
+            last = behind == open.end() ? block(found) : block(*behind);
+  for (int row = 1; row < static_cast<int>(observations.rows()); ++row)
+    if (block(row) >= first && block(row) <= last) result.push_back(row);
   return result;
 }
 
@@ -32,10 +40,8 @@ MeanModel with_change_points_of_all(const Observations& observations, MeanModel 
     for (std::size_t k = 0; k < parameters.size(); ++k) {
       if (parameters[k].role != ParameterRole::kChangePoint) continue;
       const double found = model.terms[t].parameters[k];
-      const auto before = std::lower_bound(open.begin(), open.end(), static_cast<int>(found));
-      const int last = before == open.begin() ? -1 : *std::prev(before);
       std::vector<std::pair<double, double>> likelihood;  // by first run
-      for (const int row : candidates(observations, last, static_cast<int>(found))) {
+      for (const int row : candidates(observations, open, static_cast<int>(found))) {
         MeanModel moved = model;
         moved.terms[t].parameters[k] = row;
         likelihood.emplace_back(fit_jointly(observations, moved, rows).variances.log_likelihood, row);

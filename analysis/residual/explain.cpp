@@ -183,8 +183,7 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   if (static_cast<int>(found.accepted.size()) >= settings.most_effects)
     explanation.warnings.push_back(
         fmt::format("the search ended with {} effects, as many as --max-effects allows: where there are "
-                    "more, these may be "
-                    "wrong; try more",
+                    "more, these may be wrong; try more",
                     found.accepted.size()));
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
@@ -213,9 +212,8 @@ Explanation explain_all(const Observations& observations, const std::vector<cons
   const HeldOutErrors after = score(wide, named, named.variances, seal.open, scored);
   if (before.count() == 0)
     throw InputError(
-        "no row that is held out can be scored: each stands alone in a group that has no other rows; hold "
-        "out "
-        "others");
+        "no row that is held out can be scored: each stands alone in a group that has no other rows; "
+        "hold out others");
   set_interval(observations, before, settings.seed, explanation.before);
   set_interval(observations, after, settings.seed, explanation.after);
   explanation.noise_floor =

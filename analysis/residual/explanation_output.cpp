@@ -203,8 +203,8 @@ std::string explanation_text(const Explanation& e) {
   }
   for (const UnknownStructure& u : e.unknown) {
     const bool plain = u.covariate_unit.empty() || u.covariate_unit == "1";
-    text += fmt::format("\n  unknown: depends on {}{}{}, amplitude {:.3g}{}, p = {:.3g}\n", u.covariate,
-                        plain ? "" : " [" + u.covariate_unit + "]",
+    text += fmt::format("\n  unknown: depends on {}{}{}{}, amplitude {:.3g}{}, p = {:.3g}\n", u.covariate,
+                        plain ? "" : " [" + u.covariate_unit + "]", u.times.empty() ? "" : " × " + u.times,
                         u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit,
                         u.p_value);
     if (!u.place.empty()) text += fmt::format("    {}\n", place_in_words(u.place));

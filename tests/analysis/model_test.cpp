@@ -168,7 +168,7 @@ TEST(ApplyModel, ACurveOfTwoConditionsIsWeightedByTheOther) {
                    .times = OtherCondition{"load", {.centre = 2, .scale = 4}, 0.1}}};
   model.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-6);
   CampaignData data = four_runs();
-  for (Run& run : data.runs) run.numbers["load"] = 3;
+  for (auto& run : data.runs) run.numbers["load"] = 3;
   data.runs[1].numbers["load"] = 30;  // farther than any that the model has seen
   data.runs[3].numbers.erase("load");
   const ModelVersion read = model_from_json(model_json(model), "it");

@@ -25,7 +25,7 @@ function answerSection() {
       ];
     }),
     adopted.length ? parameterTable(adopted, unit) : [],
-    unknown.map((u) => [h('h3', {}, `unknown: ${u.covariate}`), h('p', {}, prose(unknownText(u, unit)))]),
+    unknown.map((u) => [h('h3', {}, `unknown: ${[u.covariate, u.times].filter(Boolean).join(' × ')}`), h('p', {}, prose(unknownText(u, unit)))]),
   ];
 }
 

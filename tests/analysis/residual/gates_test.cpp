@@ -1,0 +1,122 @@
+// What is beyond chance and gets no name all the same; what is said beside a name.
+#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/simulated.h"
+#include "support/seeds.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using test::explained;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+
+struct Gates : testing::Test {
+  std::mt19937_64 random{test::seed()};
+
+  Observations observations() {
+    return test::simulate({.runs_of_block = std::vector<int>(16, 12),
+                           .groups = 4,
+                           .channels = 4,
+                           .sigma = 0.002,
+                           .session_ratio = 0.2},
+                          random);
+  }
+  static std::vector<std::string> names(const Explanation& e) {
+    std::vector<std::string> result;
+    for (const AdoptedEffect& adopted : e.adopted) result.push_back(adopted.term.effect->name);
+    return result;
+  }
+  /// The thrust follows what the speed was; the covariate is what was read.
+  void add_speed(Observations& o, double spread_rpm, double reading_rpm) {
+    test::add_covariate(o, "speed_rpm", 5000 - spread_rpm, 5000 + spread_rpm, random);
+    Covariate& speed = o.covariates.back();
+    o.rig.nominal_speed_rpm = 5000;
+    test::set_y(o, o.y.colwise() + VectorXd(2 * (speed.value.col(0).array() / 5000).log()));
+    std::normal_distribution<double> reading(0, reading_rpm);
+    for (Index row = 0; row < speed.value.rows(); ++row) speed.value(row, 0) += reading(random);
+  }
+};
+
+/// More thrust for the first minute only: two exponentials of several times its size make that as well, one
+/// against the other.
+TEST_F(Gates, TwoFormulasThatCancelEachOtherAreNotBothNamed) {
+  Observations o = observations();
+  o.in_tunnel.assign(o.in_tunnel.size(), true);
+  test::add_covariate(o, "time_since_motor_start_s", 20, 900, random);
+  MatrixXd y = o.y;
+  for (Index row = 0; row < y.rows(); ++row)
+    if (o.covariates.back().value(row, 0) < 60) y.row(row).array() += 0.02;
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  EXPECT_LE(e.adopted.size(), 1u) << explanation_text(e);
+  for (const AdoptedEffect& adopted : e.adopted) EXPECT_LT(std::abs(adopted.parameters[0].value), 0.1);
+}
+
+TEST_F(Gates, SpeedIsNamedWhereItsReadingIsGood) {
+  Observations o = observations();
+  add_speed(o, 25, 0.5);
+  EXPECT_THAT(names(explained(o)), testing::ElementsAre("rotor_speed"));
+}
+
+/// Readings that scatter more than the speed does: the thrust depends on them, but not by the square.
+TEST_F(Gates, ANoisyTachometerIsNoBladeThatFlexes) {
+  Observations o = observations();
+  add_speed(o, 15, 14);
+  const Explanation e = explained(o);
+  for (const char* name : {"blade_flex", "reynolds_number", "tip_mach"}) {
+    EXPECT_TRUE(!testing::Value(names(e), Contains(name)) ||
+                testing::Value(names(e), Contains("rotor_speed")))
+        << explanation_text(e);
+  }
+}
+
+TEST_F(Gates, WhatTakesBackTheSquareOfTheSpeedIsDoubted) {
+  Observations o = observations();
+  add_speed(o, 60, 0.1);
+  const VectorXd u = (o.find("speed_rpm")->value.col(0).array() / 5000).log();
+  test::set_y(o, o.y.colwise() - 0.4 * u);  // an exponent of 1.6
+  const Explanation e = explained(o);
+  ASSERT_THAT(names(e), Contains("rotor_speed"));
+  ASSERT_GE(e.adopted.size(), 2u);
+  EXPECT_THAT(e.warnings, Contains(HasSubstr("readings of speed_rpm that scatter by")));
+}
+
+TEST_F(Gates, AnEndAtMaxEffectsIsSaid) {
+  Observations o = observations();
+  test::add_covariate(o, "supply_voltage_V", 15, 16.5, random);
+  test::add_covariate(o, "tunnel_airspeed_m_s", 0, 0.5, random);
+  test::add_effect(o, "supply_voltage", {0.3});
+  test::add_effect(o, "axial_wind", {-0.05});
+  SearchSettings settings = test::quick();
+  const auto said = Contains(HasSubstr("as many as --max-effects allows"));
+  settings.most_effects = 1;
+  EXPECT_THAT(explain(o, test::every_effect(), settings).warnings, said);
+  settings.most_effects = 4;
+  EXPECT_THAT(explain(o, test::every_effect(), settings).warnings, Not(said));
+}
+
+/// One effect of all rotors, and of one rotor the opposite: cells of which one does not drift.
+TEST_F(Gates, OneRotorMayDifferFromWhatAllDo) {
+  Observations o = observations();
+  test::add_covariate(o, "cell_temperature_C", 15, 35, random);
+  const VectorXd warmer = o.covariates.back().value.col(0).array() - 25;
+  MatrixXd y = o.y.colwise() + 0.001 * warmer;
+  y.col(3) -= 0.001 * warmer;
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  EXPECT_EQ(e.adopted.size(), 2u) << explanation_text(e);
+  EXPECT_LT(e.after.held_out_rmse, 1.3 * e.noise_floor);
+  EXPECT_TRUE(e.unknown.empty()) << explanation_text(e);
+}
+
+}  // namespace
+}  // namespace tunnelrig
