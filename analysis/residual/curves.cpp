@@ -107,10 +107,35 @@ bool can_be_followed(const Observations& observations, const Covariate& covariat
          covariate.value.maxCoeff() > covariate.value.minCoeff();
 }
 
-/// What two conditions do together and neither does alone: the product of both, each from its mean. Two that
-/// go together make a bend of one.
-void add_products(const Observations& observations, std::vector<Curve>& curves) {
-  constexpr double kTogether = 0.9;  // correlation
+/// Whether a product of two conditions is, in these rows, mostly something else than cubics of the two, all
+/// in deviations from the groups' means.
+bool says_more(const Observations& observations, const std::vector<int>& rows, const Covariate& first,
+               const Covariate& second, const MatrixXd& product) {
+  constexpr int kDegree = 3;
+  constexpr double kLeast = 0.5;  // of its variance
+  MatrixXd columns(static_cast<Index>(rows.size()), 2 * kDegree + 1);
+  Index next = 0;
+  for (const Covariate* covariate : {&first, &second}) {
+    const Eigen::ArrayXd x = covariate->value(rows, 0).array() - covariate->value.mean();
+    for (int power = 1; power <= kDegree; ++power) columns.col(next++) = (x / x.abs().maxCoeff()).pow(power);
+  }
+  columns.col(next) = product(rows, 0);
+  std::map<int, std::vector<Index>> groups;
+  for (Index r = 0; r < columns.rows(); ++r)
+    groups[observations.group[static_cast<std::size_t>(rows[static_cast<std::size_t>(r)])]].push_back(r);
+  for (const auto& [group, members] : groups) {
+    const MatrixXd own = columns(members, Eigen::all);
+    columns(members, Eigen::all) = own.rowwise() - own.colwise().mean();
+  }
+  const MatrixXd alone = columns.leftCols(next);
+  const Eigen::VectorXd whole = columns.col(next);
+  const Eigen::VectorXd left = whole - alone * alone.completeOrthogonalDecomposition().solve(whole);
+  return left.squaredNorm() > kLeast * whole.squaredNorm();
+}
+
+/// What two conditions do together and neither does alone: the product of both, each from its mean.
+void add_products(const Observations& observations, const std::vector<int>& rows,
+                  std::vector<Curve>& curves) {
   std::vector<const Covariate*> conditions;
   for (const Covariate& covariate : observations.covariates)
     if (!covariate.derived && !covariate.per_channel() && covariate.labels.empty() &&
@@ -119,7 +144,6 @@ void add_products(const Observations& observations, std::vector<Curve>& curves) 
   for (std::size_t a = 0; a < conditions.size(); ++a)
     for (std::size_t b = a + 1; b < conditions.size(); ++b) {
       const Covariate &first = *conditions[a], &second = *conditions[b];
-      if (std::abs(correlation(first, second)) > kTogether) continue;
       const double low = first.value.minCoeff(), high = first.value.maxCoeff(), mean = first.value.mean();
       const Eigen::ArrayXd from_mean = second.value.col(0).array() - second.value.mean();
       const Strength strength{.centre = second.value.mean(), .scale = from_mean.abs().maxCoeff()};
@@ -134,7 +158,8 @@ void add_products(const Observations& observations, std::vector<Curve>& curves) 
                   .place = {second.name, from_mean / strength.scale},
                   .strength = strength};
       curve.columns[0][0] = curve.place.weight.asDiagonal() * curve.columns[0][0];
-      curves.push_back(std::move(curve));
+      if (says_more(observations, rows, first, second, curve.columns[0][0]))
+        curves.push_back(std::move(curve));
     }
 }
 
@@ -248,7 +273,7 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
     for (const int count : kBends)
       if (count <= most && gap * count <= 2) add(CurveShape::kWaves, count);
   }
-  add_products(observations, curves);
+  add_products(observations, rows, curves);
   if (!observations.shape.empty())
     for (const int rotor : rotors)
       curves.push_back(

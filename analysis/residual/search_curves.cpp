@@ -175,7 +175,9 @@ void Search::drop_what_a_curve_replaces() {
     if (term.per_group) continue;  // stands in the baseline
     const bool outshone = outshone_by_curve(term);
     const JointFit without = fit_without(t);
-    if (!outshone && !at_bound(fit_, term) && is_still_found(term, without)) continue;
+    // What two conditions do together is not what one of them does.
+    const bool product = result_.curves.back().curve.strength.has_value();
+    if (!outshone && !at_bound(fit_, term) && (product || is_still_found(term, without))) continue;
     if (outshone)
       give_way_to_curve(t, without);
     else
