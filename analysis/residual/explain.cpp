@@ -128,14 +128,13 @@ void warn_of_doubts(Explanation& explanation) {
                                                     adopted.term.label(), amplitude.name));
   }
   if (!explanation.adopted.empty() && explanation.after.held_out_rmse > explanation.before.held_out_rmse)
-    explanation.warnings.push_back(
+    explanation.warnings.emplace_back(
         "on the sealed blocks the error is larger with what was adopted than without: doubt it");
   else if (explanation.after.held_out_low > kFarAboveFloor * explanation.noise_floor &&
            explanation.noise_floor > 0)
     explanation.warnings.push_back(
         fmt::format("on the sealed blocks the error after is {:.2g} times the noise floor: something varies "
-                    "there that the "
-                    "model does not have",
+                    "there that the model does not have",
                     explanation.after.held_out_rmse / explanation.noise_floor));
 }
 

@@ -265,7 +265,7 @@ struct CandidateScan::Impl {
   /// By how much a candidate's evidence may grow with a smaller session variance, which has a part of the
   /// candidate's work in it: of sessions that scatter little, hardly at all.
   double most_hidden(std::size_t candidate, const State& null) const {
-    constexpr std::array<double, kRatios.size()> kMostHidden = {0, 0, 0, 0, 0.5, 1.5, 3, 6, 1e9};
+    constexpr std::array<double, kRatios.size()> kMostHidden = {0, 0, 0, 0, 0, 1.5, 3, 6, 1e9};
     double most = 0;
     for (std::size_t s = 0; s < model.strata().size(); ++s)
       if (model.strata()[s].means() && touches[candidate][s])

@@ -10,6 +10,13 @@ namespace tunnelrig {
 
 void Search::add_pairs_of_steps(Scan& scan) const {
   constexpr double kWeight = 1. / 6;  // six pairs for four rotors, and rarer than one
+  constexpr double kHiding = 1;  // σ_session²/σ_run² of what rotors differ by; below, no steps hide in it
+  bool hiding = false;
+  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
+    const MixedModel::Stratum& stratum = mixed_->strata()[s];
+    hiding |= stratum.means() && stratum.side() == 1 && kRatios[fit_.variances.ratio[s]] >= kHiding;
+  }
+  if (!hiding) return;
   const auto is_step = [&](std::size_t i) {
     return scan.ways[i].rotor >= 0 && scan.ways[i].effect->has_change_point();
   };
