@@ -32,7 +32,6 @@ struct Source {
   double cell(Index r, const std::string& column) const {
     return table.sheet.number(rows[static_cast<std::size_t>(r)], column).value_or(kNaN);
   }
-  /// Throws InputError naming file, line and column where there is none.
   std::vector<double> numbers(const std::string& column) const {
     std::vector<double> result;
     for (const std::size_t row : rows) result.push_back(table.sheet.require_number(row, column));
