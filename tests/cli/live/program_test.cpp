@@ -323,7 +323,7 @@ TEST_F(LivePage, TenThousandRuns) {
   EventStream stream(serve.port());
   const auto begin = std::chrono::steady_clock::now();
   const auto campaign = stream.next("campaign", where([](const json& now) { return !now["maps"].is_null(); }),
-                                    std::chrono::seconds(60));
+                                    std::chrono::seconds(180));
   ASSERT_TRUE(campaign);
   EXPECT_EQ(json::parse(*campaign)["runs"].size(), 10000u);
   RecordProperty("bytes", static_cast<int>(campaign->size()));
