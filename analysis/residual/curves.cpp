@@ -107,35 +107,10 @@ bool can_be_followed(const Observations& observations, const Covariate& covariat
          covariate.value.maxCoeff() > covariate.value.minCoeff();
 }
 
-/// Whether a product of two conditions is, in these rows, mostly something else than cubics of the two, all
-/// in deviations from the groups' means.
-bool says_more(const Observations& observations, const std::vector<int>& rows, const Covariate& first,
-               const Covariate& second, const MatrixXd& product) {
-  constexpr int kDegree = 3;
-  constexpr double kLeast = 0.5;  // of its variance
-  MatrixXd columns(static_cast<Index>(rows.size()), 2 * kDegree + 1);
-  Index next = 0;
-  for (const Covariate* covariate : {&first, &second}) {
-    const Eigen::ArrayXd x = covariate->value(rows, 0).array() - covariate->value.mean();
-    for (int power = 1; power <= kDegree; ++power) columns.col(next++) = (x / x.abs().maxCoeff()).pow(power);
-  }
-  columns.col(next) = product(rows, 0);
-  std::map<int, std::vector<Index>> groups;
-  for (Index r = 0; r < columns.rows(); ++r)
-    groups[observations.group[static_cast<std::size_t>(rows[static_cast<std::size_t>(r)])]].push_back(r);
-  for (const auto& [group, members] : groups) {
-    const MatrixXd own = columns(members, Eigen::all);
-    columns(members, Eigen::all) = own.rowwise() - own.colwise().mean();
-  }
-  const MatrixXd alone = columns.leftCols(next);
-  const Eigen::VectorXd whole = columns.col(next);
-  const Eigen::VectorXd left = whole - alone * alone.completeOrthogonalDecomposition().solve(whole);
-  return left.squaredNorm() > kLeast * whole.squaredNorm();
-}
-
 /// What two conditions do together and neither does alone: the product of both, each from its mean.
 void add_products(const Observations& observations, const std::vector<int>& rows,
                   std::vector<Curve>& curves) {
+  constexpr double kLeast = 0.5;  // of its variance that is neither's own
   std::vector<const Covariate*> conditions;
   for (const Covariate& covariate : observations.covariates)
     if (!covariate.derived && !covariate.per_channel() && covariate.labels.empty() &&
@@ -158,8 +133,9 @@ void add_products(const Observations& observations, const std::vector<int>& rows
                   .place = {second.name, from_mean / strength.scale},
                   .strength = strength};
       curve.columns[0][0] = curve.place.weight.asDiagonal() * curve.columns[0][0];
-      if (says_more(observations, rows, first, second, curve.columns[0][0]))
-        curves.push_back(std::move(curve));
+      const double own = share_beside_cubics(
+          observations, rows, {first.value(rows, 0), second.value(rows, 0)}, curve.columns[0][0](rows, 0));
+      if (own > kLeast) curves.push_back(std::move(curve));
     }
 }
 
@@ -189,6 +165,29 @@ double correlation(const Covariate& first, const Covariate& second) {
                         v = second.value.col(0).array() - second.value.col(0).mean();
   const double norms = u.norm() * v.norm();
   return norms > 0 ? u.dot(v) / norms : 0;
+}
+
+double share_beside_cubics(const Observations& observations, const std::vector<int>& rows,
+                           const std::vector<Eigen::VectorXd>& conditions, const Eigen::VectorXd& column) {
+  constexpr int kDegree = 3;
+  MatrixXd columns(column.size(), kDegree * static_cast<Index>(conditions.size()) + 1);
+  Index next = 0;
+  for (const Eigen::VectorXd& condition : conditions) {
+    const Eigen::ArrayXd x = condition.array() - condition.mean();
+    for (int power = 1; power <= kDegree; ++power) columns.col(next++) = (x / x.abs().maxCoeff()).pow(power);
+  }
+  columns.col(next) = column;
+  std::map<int, std::vector<Index>> groups;
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    groups[observations.group[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
+  for (const auto& [group, members] : groups) {
+    const MatrixXd own = columns(members, Eigen::all);
+    columns(members, Eigen::all) = own.rowwise() - own.colwise().mean();
+  }
+  const MatrixXd cubics = columns.leftCols(next);
+  const Eigen::VectorXd whole = columns.col(next);
+  const Eigen::VectorXd left = whole - cubics * cubics.completeOrthogonalDecomposition().solve(whole);
+  return whole.squaredNorm() > 0 ? left.squaredNorm() / whole.squaredNorm() : 0;
 }
 
 int different_values(const Covariate& covariate, const std::vector<int>& rows) {
@@ -232,8 +231,7 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
   const std::vector<Place> places = places_to_try(observations, rows);
   std::vector<Curve> curves;
   for (const Covariate& covariate : observations.covariates) {
-    if (observations.not_usable.contains(covariate.name) || covariate.value.array().isNaN().any()) continue;
-    if (!(covariate.value.maxCoeff() > covariate.value.minCoeff())) continue;
+    if (!can_be_followed(observations, covariate)) continue;
     if (const std::vector<double> levels = levels_of(observations, covariate, rows); !levels.empty()) {
       const auto column_at = [&](int k, double x) { return level_column(levels, k, x); };
       for (const int rotor : rotors)

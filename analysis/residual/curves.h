@@ -43,6 +43,12 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
 /// Over all rows, of the first channel; 0 where one of them is constant.
 double correlation(const Covariate& first, const Covariate& second);
 
+/// Of a column's variance in `rows`, the share that is no cubic of these conditions, all in deviations from
+/// the groups' means; column and conditions have an entry for each of `rows`. 0 where the column does not
+/// vary.
+double share_beside_cubics(const Observations& observations, const std::vector<int>& rows,
+                           const std::vector<Eigen::VectorXd>& conditions, const Eigen::VectorXd& column);
+
 /// How many values `rows` have; of the first channel.
 int different_values(const Covariate& covariate, const std::vector<int>& rows);
 

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -223,25 +222,10 @@ std::vector<std::string> Search::conditions_of(const Effect& effect) const {
 }
 
 double Search::share_beside(const Curve& curve, const Term& term) const {
-  constexpr int kDegree = 3;
   const Eigen::Index channel = std::max(term.rotor, 0), of_curve = curve.x.cols() > 1 ? channel : 0;
-  const Eigen::VectorXd x = curve.x(rows_, of_curve).array() - curve.x.col(of_curve).mean();
-  Eigen::MatrixXd powers(x.size(), kDegree + 1);  // and what the term makes of its conditions
-  for (int k = 0; k < kDegree; ++k) powers.col(k) = (x / x.cwiseAbs().maxCoeff()).array().pow(k + 1);
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
-  powers.col(kDegree) = respond(term, observations_, predicted).derivative[0][0](rows_, channel);
-  std::map<int, std::vector<Eigen::Index>> groups;
-  for (std::size_t r = 0; r < rows_.size(); ++r)
-    groups[observations_.group[static_cast<std::size_t>(rows_[r])]].push_back(static_cast<Eigen::Index>(r));
-  for (const auto& [group, members] : groups) {
-    const Eigen::MatrixXd own = powers(members, Eigen::all);
-    powers(members, Eigen::all) = own.rowwise() - own.colwise().mean();
-  }
-  const Eigen::VectorXd column = powers.col(kDegree);
-  const Eigen::VectorXd left =
-      column -
-      powers.leftCols(kDegree) * powers.leftCols(kDegree).completeOrthogonalDecomposition().solve(column);
-  return column.squaredNorm() > 0 ? left.squaredNorm() / column.squaredNorm() : 0;
+  return share_beside_cubics(observations_, rows_, {curve.x(rows_, of_curve)},
+                             respond(term, observations_, predicted).derivative[0][0](rows_, channel));
 }
 
 bool Search::is_work_of_a_curve(const Term& term) const {

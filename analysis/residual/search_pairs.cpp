@@ -1,10 +1,9 @@
 // Two steps of two rotors at one run. What rotors have in common scatters less than what they differ by, and
 // says of each of two opposite steps alone that there is none.
-#include "analysis/residual/null_maxima.h"
 #include "analysis/residual/search.h"
 
 #include <algorithm>
-#include <cmath>
+#include <utility>
 
 namespace tunnelrig {
 

@@ -45,13 +45,19 @@ VectorXd variance_of_a_run(const Observations& observations, const NullFit& vari
   return result;
 }
 
+/// Of a normal distribution, by sizes of deviations that a few gross ones may be among.
+double sigma_by_median(const VectorXd& sizes) {
+  constexpr double kMedianOfNormal = 0.6745;
+  return upper_median({sizes.begin(), sizes.end()}) / kMedianOfNormal;
+}
+
 /// Several gross rows hide each other in the variance: of n rows, k alike are hardly beyond √(n/k) of it. But
 /// they lie apart. Scaled residuals of a table's rows, each from its group's median, in σ by the median size
 /// of all, where these are the farthest (at most one of ten): beyond 10, and twice as far as the next; 0
 /// elsewhere. The tails of a distribution, or of a group that scatters more, have no such gap.
 VectorXd distance_of_those_apart(const Observations& observations, const std::vector<int>& rows,
                                  const VectorXd& residual) {
-  constexpr double kFar = 10, kGap = 2, kMedianOfNormal = 0.6745;
+  constexpr double kFar = 10, kGap = 2;
   constexpr std::size_t kFewestOfGroup = 5, kRowsPerGross = 10;
   std::map<int, std::vector<Index>> groups;
   for (Index r = 0; r < residual.size(); ++r)
@@ -64,7 +70,7 @@ VectorXd distance_of_those_apart(const Observations& observations, const std::ve
         own.array() - (members.size() < kFewestOfGroup ? 0 : upper_median({own.begin(), own.end()}));
   }
   const VectorXd size = away.cwiseAbs();
-  const double sigma = upper_median({size.begin(), size.end()}) / kMedianOfNormal;
+  const double sigma = sigma_by_median(size);
   std::vector<double> sorted(size.begin(), size.end());
   std::sort(sorted.begin(), sorted.end(), std::greater<>());
   for (std::size_t k = sorted.size() / kRowsPerGross; sigma > 0 && k > 0; --k)
@@ -138,9 +144,8 @@ std::optional<SuspectRow> gross_row(const Observations& observations) {
 }
 
 std::vector<SuspectRow> wild_runs(const Observations& observations) {
-  // A normal run's median deviation is 0.67 σ. Of Student's t with three degrees of freedom one of 18,000
-  // lies beyond this.
-  constexpr double kWild = 30, kMedianOfNormal = 0.6745;
+  // Of Student's t with three degrees of freedom one of 18,000 lies beyond this.
+  constexpr double kWild = 30;
   constexpr std::size_t kFewest = 3;  // of two runs or rotors, nothing says which is wrong
   if (static_cast<std::size_t>(observations.channels()) < kFewest) return {};
   std::map<int, std::vector<Index>> runs_of_group;
@@ -159,7 +164,7 @@ std::vector<SuspectRow> wild_runs(const Observations& observations) {
   }
   for (Index c = 0; c < away.cols(); ++c) {
     const VectorXd size = away.col(c).cwiseAbs();
-    const double sigma = upper_median({size.begin(), size.end()}) / kMedianOfNormal;
+    const double sigma = sigma_by_median(size);
     away.col(c) /= sigma > 0 ? sigma : std::numeric_limits<double>::infinity();
   }
   std::vector<SuspectRow> result;

@@ -135,16 +135,21 @@ TEST(ApplyModel, LevelsHoldWhereTheyWereSeenOnly) {
               HasSubstr("one level more than coefficients"));
 }
 
-TEST(ApplyModel, ACurveOfAPlaceIsWeightedByIt) {
+ModelVersion straight_over_clip() {
   ModelVersion model{.version = 1, .explanation = "{}"};
   model.curves = {{.covariate = "clip",
                    .shape = CurveShape::kStraight,
                    .low = 0.1,
                    .high = 0.4,
                    .coefficients = {0.02},
-                   .centre = {0.5},
-                   .place = "tunnel"}};
+                   .centre = {0.5}}};
   model.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-6);
+  return model;
+}
+
+TEST(ApplyModel, ACurveOfAPlaceIsWeightedByIt) {
+  ModelVersion model = straight_over_clip();
+  model.curves[0].place = "tunnel";
   const CampaignData data = four_runs();
   const Reduction reduction = corrected(data, model_from_json(model_json(model), "it"));
   const auto ratio = [&](std::size_t run) {
@@ -158,15 +163,8 @@ TEST(ApplyModel, ACurveOfAPlaceIsWeightedByIt) {
 }
 
 TEST(ApplyModel, ACurveOfTwoConditionsIsWeightedByTheOther) {
-  ModelVersion model{.version = 1, .explanation = "{}"};
-  model.curves = {{.covariate = "clip",
-                   .shape = CurveShape::kStraight,
-                   .low = 0.1,
-                   .high = 0.4,
-                   .coefficients = {0.02},
-                   .centre = {0.5},
-                   .times = OtherCondition{"load", {.centre = 2, .scale = 4}, 0.1}}};
-  model.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-6);
+  ModelVersion model = straight_over_clip();
+  model.curves[0].times = OtherCondition{"load", {.centre = 2, .scale = 4}, 0.1};
   CampaignData data = four_runs();
   for (auto& run : data.runs) run.numbers["load"] = 3;
   data.runs[1].numbers["load"] = 30;  // farther than any that the model has seen
