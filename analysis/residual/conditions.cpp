@@ -215,6 +215,11 @@ void warn_of_scatter(const Observations& observations, Explanation& explanation)
                     fmt::join(observations.scatter.rotors, ", ")));
   if (observations.scatter.runs.size() > 0)
     explanation.warnings.push_back(fmt::format("{}: allowed for", wilder_runs(observations)));
+  if (const auto& [names, runs] = observations.scatter.by_condition; !names.empty())
+    explanation.warnings.push_back(fmt::format(
+        "{} scatter more or less with {} ({:.2g} to {:.2g} times their mean scatter): weighed by it",
+        observations.from_table ? "rows" : "runs", fmt::join(names, " and "), runs.minCoeff(),
+        runs.maxCoeff()));
   constexpr std::array<std::string_view, 2> kOf = {"all rotors together", "one rotor against another"};
   for (std::size_t s = 0; s < kOf.size(); ++s) {
     const double correlation = observations.scatter.run_correlation[s];

@@ -76,6 +76,21 @@ double widest_gap(const Covariate& covariate, const std::vector<int>& rows) {
   return gap / (*values.rbegin() - *values.begin());
 }
 
+/// How many values there are at least a hundredth of the range apart: four speeds that scatter a little are
+/// four, and between them a wave has any height.
+int places_on_range(const Covariate& covariate, const std::vector<int>& rows) {
+  constexpr double kApart = 0.01;
+  std::set<double> values;
+  for (const int row : rows) values.insert(covariate.value(row, 0));
+  const double range = *values.rbegin() - *values.begin();
+  int count = 0;
+  for (auto next = values.begin(); next != values.end(); next = values.lower_bound(*next + kApart * range)) {
+    ++count;
+    if (!(range > 0)) break;
+  }
+  return count;
+}
+
 /// What is straight, on the curve's rotors.
 MatrixXd straight_over(const Curve& curve) {
   const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
@@ -247,7 +262,7 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
     if (!covariate.labels.empty()) continue;
     if (covariate.derived && covariate.name == "hour_of_day" && repeats_another(observations, covariate))
       continue;
-    const int most = different_values(covariate, rows) / 3;
+    const int most = places_on_range(covariate, rows) / 3;
     const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff();
     const auto add = [&](CurveShape shape, int count, const Place& place = {}) {
       const auto column_at = [&](int k, double x) { return curve_column(shape, k, x, low, high); };

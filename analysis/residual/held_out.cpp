@@ -49,9 +49,9 @@ Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vect
 
 /// Where whole groups are held out, a group's constant and slopes are fitted to every other run of it; the
 /// rest is scored, if there are as many runs as coefficients. `residual` came with NaN there because the
-/// model has no such group: `plain` is the same without any baseline.
-void own_baseline(const Observations& observations, const std::vector<int>& rows, const MatrixXd& plain,
-                  double sigma2, MatrixXd& residual, MatrixXd& variance) {
+/// model has no such group: `plain` is the same without any baseline. `scatter`: of each run.
+void own_baseline(const Observations& observations, const std::vector<int>& rows, const VectorXd& scatter,
+                  const MatrixXd& plain, double sigma2, MatrixXd& residual, MatrixXd& variance) {
   std::map<int, std::vector<Index>> runs;
   for (std::size_t r = 0; r < rows.size(); ++r)
     if (std::isnan(residual(static_cast<Index>(r), 0)))
@@ -65,19 +65,22 @@ void own_baseline(const Observations& observations, const std::vector<int>& rows
         x.row(static_cast<Index>(m)) << 1, observations.slopes.row(rows[static_cast<std::size_t>(of[m])]);
       return x;
     };
-    const MatrixXd x = design(fitted), wanted = design(scored);
+    const VectorXd weight = scatter(fitted).cwiseInverse();
+    const MatrixXd x = weight.asDiagonal() * design(fitted), wanted = design(scored);
     if (x.rows() < x.cols()) continue;
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(x);
-    const MatrixXd weights = wanted * solver.pseudoInverse();  // of the fitted runs, in each prediction
-    residual(scored, Eigen::all) = plain(scored, Eigen::all) - weights * plain(fitted, Eigen::all);
+    const MatrixXd of_scatter = wanted * solver.pseudoInverse();  // of the fitted runs, each over its scatter
+    residual(scored, Eigen::all) =
+        plain(scored, Eigen::all) - of_scatter * weight.asDiagonal() * plain(fitted, Eigen::all);
     for (std::size_t m = 0; m < scored.size(); ++m)
-      variance.row(scored[m]).setConstant(sigma2 * (1 + weights.row(static_cast<Index>(m)).squaredNorm()));
+      variance.row(scored[m]).setConstant(
+          sigma2 * (std::pow(scatter(scored[m]), 2) + of_scatter.row(static_cast<Index>(m)).squaredNorm()));
   }
 }
 
 /// V^(−½)e of one stratum. Missing errors count as none.
 VectorXd whitened(const Observations& observations, const std::vector<int>& rows, const MatrixXd& error,
-                  double sigma, double ratio, double run_correlation) {
+                  const VectorXd& scatter, double sigma, double ratio, double run_correlation) {
   MatrixXd result = error.array().isNaN().select(0, error);
   std::map<int, std::vector<Index>> of_block;
   for (std::size_t r = 0; r < rows.size(); ++r)
@@ -85,7 +88,7 @@ VectorXd whitened(const Observations& observations, const std::vector<int>& rows
       of_block[observations.block[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
   std::vector<std::vector<Index>> blocks;
   for (auto& [block, runs] : of_block) blocks.push_back(std::move(runs));
-  whiten(blocks, ratio, run_correlation, result);
+  whiten(blocks, scatter, ratio, run_correlation, result);
   return result.reshaped() / std::max(sigma, 1e-150);
 }
 
@@ -133,7 +136,9 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     const double sigma2 = null.sigma[s] * null.sigma[s];
     Stacked plain = test.stack(s, {&y});
     Stacked residual = plain - model.baseline_prediction(s, null.ratio[s], fit.y[s], test_rows);
-    Stacked variance = Stacked::Constant(residual.rows(), 1, 1 + kRatios[null.ratio[s]]);
+    const VectorXd scatter =
+        stratum.means() ? observations.scatter.of_runs(test_rows) : VectorXd(VectorXd::Ones(n));
+    Stacked variance = (scatter.array().square() + kRatios[null.ratio[s]]).replicate(stratum.modes, 1);
     variance += model.baseline_variance(s, null.ratio[s], test_rows).replicate(stratum.modes, 1);
     variance *= sigma2;
     if (!items.empty()) {
@@ -146,9 +151,9 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     MatrixXd errors = Eigen::Map<const MatrixXd>(residual.data(), n, stratum.modes);
     MatrixXd variances = Eigen::Map<const MatrixXd>(variance.data(), n, stratum.modes);
     if (stratum.means() && (observations.groups_within_blocks || !observations.held_out.empty()))
-      own_baseline(observations, test_rows, Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes),
-                   sigma2, errors, variances);
-    parts.push_back(whitened(observations, test_rows, errors, null.sigma[s], kRatios[null.ratio[s]],
+      own_baseline(observations, test_rows, scatter,
+                   Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes), sigma2, errors, variances);
+    parts.push_back(whitened(observations, test_rows, errors, scatter, null.sigma[s], kRatios[null.ratio[s]],
                              model.run_correlation(s)));
     if (!stratum.means()) continue;
     error_by_mode.middleCols(stratum.first_mode, stratum.modes) = errors;

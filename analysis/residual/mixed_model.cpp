@@ -35,33 +35,37 @@ MatrixXd orthonormal_modes(Index channels) {
   return orthonormal_from(VectorXd::Ones(channels));
 }
 
-/// (Φ + a 11ᵀ)^(−½) = (I − share w wᵀ) A, block by block: A = Φ^(−½) takes from each run what the one before
-/// it foretells, and makes 1 to w = (1, later, later, …).
+/// (DΦD + a 11ᵀ)^(−½) = (I − share w wᵀ) A D⁻¹, block by block: D⁻¹ divides each run by its scatter, A =
+/// Φ^(−½) takes from it what the one before foretells, and w is what both make of 1.
 class Root {
  public:
-  Root(const std::vector<std::vector<Index>>& blocks, double session_ratio, double run_correlation)
+  Root(const std::vector<std::vector<Index>>& blocks, const VectorXd& scatter, double session_ratio,
+       double run_correlation)
       : blocks_(blocks),
+        inverse_scatter_(scatter.cwiseInverse()),
         session_ratio_(session_ratio),
         correlation_(run_correlation),
         scale_(1 / std::sqrt(1 - run_correlation * run_correlation)),
-        later_(std::sqrt((1 - run_correlation) / (1 + run_correlation))) {
-    for (std::size_t b = 0; b < blocks.size(); ++b)
-      share_.push_back((1 - 1 / std::sqrt(1 + session_ratio * squared_norm(b))) / squared_norm(b));
+        w_(inverse_scatter_) {
+    for (const auto& runs : blocks_) {
+      foretell(runs, w_);
+      const double squared_norm = w_(runs).squaredNorm();
+      squared_norm_.push_back(squared_norm);
+      share_.push_back((1 - 1 / std::sqrt(1 + session_ratio * squared_norm)) / squared_norm);
+    }
   }
 
+  double inverse_scatter(Index run) const { return inverse_scatter_(run); }
   double scale() const { return scale_; }
-  double later() const { return later_; }
+  double w(Index run) const { return w_(run); }
   /// wᵀw
-  double squared_norm(std::size_t block) const {
-    return 1 + later_ * later_ * static_cast<double>(blocks_[block].size() - 1);
-  }
+  double squared_norm(std::size_t block) const { return squared_norm_[block]; }
 
   void apply(Eigen::Ref<MatrixXd> columns) const {
+    columns.array().colwise() *= inverse_scatter_.array();
     for (Index c = 0; c < columns.cols(); ++c)
       for (std::size_t b = 0; b < blocks_.size(); ++b) {
-        const auto& runs = blocks_[b];
-        for (std::size_t k = runs.size() - 1; k > 0 && correlation_ != 0; --k)
-          columns(runs[k], c) = scale_ * (columns(runs[k], c) - correlation_ * columns(runs[k - 1], c));
+        foretell(blocks_[b], columns.col(c));
         shrink(b, columns.col(c));
       }
   }
@@ -76,48 +80,56 @@ class Root {
           if (k + 1 < runs.size()) columns(runs[k], c) -= scale_ * correlation_ * columns(runs[k + 1], c);
         }
       }
+    columns.array().colwise() *= inverse_scatter_.array();
   }
 
  private:
-  void shrink(std::size_t block, Eigen::Ref<Eigen::VectorXd> column) const {
+  void foretell(const std::vector<Index>& runs, Eigen::Ref<VectorXd> column) const {
+    for (std::size_t k = runs.size() - 1; k > 0 && correlation_ != 0; --k)
+      column(runs[k]) = scale_ * (column(runs[k]) - correlation_ * column(runs[k - 1]));
+  }
+  void shrink(std::size_t block, Eigen::Ref<VectorXd> column) const {
     if (session_ratio_ == 0) return;
-    const auto& runs = blocks_[block];
     double sum = 0;
-    for (std::size_t k = 1; k < runs.size(); ++k) sum += column(runs[k]);
-    const double mean = share_[block] * (column(runs[0]) + later_ * sum);
-    column(runs[0]) -= mean;
-    for (std::size_t k = 1; k < runs.size(); ++k) column(runs[k]) -= later_ * mean;
+    for (const Index run : blocks_[block]) sum += w_(run) * column(run);
+    sum *= share_[block];
+    for (const Index run : blocks_[block]) column(run) -= sum * w_(run);
   }
 
   const std::vector<std::vector<Index>>& blocks_;
-  double session_ratio_, correlation_, scale_, later_;
-  std::vector<double> share_;  // of each block
+  VectorXd inverse_scatter_;
+  double session_ratio_, correlation_, scale_;
+  VectorXd w_;
+  std::vector<double> squared_norm_, share_;  // of each block
 };
 
 }  // namespace
 
-void whiten(const std::vector<std::vector<Index>>& blocks, double session_ratio, double run_correlation,
+void whiten(const std::vector<std::vector<Index>>& blocks, const VectorXd& scatter, double session_ratio,
+            double run_correlation,
             Eigen::Ref<MatrixXd> columns) {  // NOLINT(performance-unnecessary-value-param): written through
-  Root(blocks, session_ratio, run_correlation).apply(columns);
+  Root(blocks, scatter, session_ratio, run_correlation).apply(columns);
 }
 
 MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
                        const std::vector<std::size_t>& ratio)
-    : MixedModel(observations, std::move(rows), ratio, observations.scatter.run_correlation) {}
+    : MixedModel(observations, std::move(rows), ratio, observations.scatter) {}
 
 MixedModel MixedModel::baseline_alone(const Observations& observations, std::vector<int> rows) {
-  return {observations, std::move(rows), {0}, {0, 0}};
+  return {observations, std::move(rows), {0}, {.rotors = observations.scatter.rotors}};
 }
 
 MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
-                       const std::vector<std::size_t>& ratio, const std::array<double, 2>& run_correlation)
+                       const std::vector<std::size_t>& ratio, const RunScatter& scatter)
     : observations_(observations),
       rows_(std::move(rows)),
-      modes_(observations.scatter.rotors.size() > 0 ? modes_of(observations.scatter.rotors)
-                                                    : orthonormal_modes(observations.channels())),
-      run_correlation_(run_correlation) {
+      modes_(scatter.rotors.size() > 0 ? modes_of(scatter.rotors)
+                                       : orthonormal_modes(observations.channels())),
+      run_correlation_(scatter.run_correlation),
+      alike_(VectorXd::Ones(static_cast<Index>(rows_.size()))),
+      scatter_(scatter.of_runs(rows_)) {
   if (modes_(0, 0) < 0) modes_ *= -1;
-  rotors_of_modes_ = observations.scatter.rotors.size() > 0 ? MatrixXd(modes_.inverse()) : modes_.transpose();
+  rotors_of_modes_ = scatter.rotors.size() > 0 ? MatrixXd(modes_.inverse()) : modes_.transpose();
   for (std::size_t component = 0; component <= observations.shape.size(); ++component) {
     strata_.push_back({component, 0, 1});
     if (observations.channels() > 1)
@@ -183,7 +195,7 @@ Eigen::RowVectorXd MixedModel::baseline_row(const GroupBaseline& group, int row)
 }
 
 MixedModel::NormalParts MixedModel::normal_parts(double run_correlation) const {
-  const Root root(blocks_, 0, run_correlation);
+  const Root root(blocks_, scatter_, 0, run_correlation);
   const Index each = own_.cols();
   NormalParts parts{MatrixXd::Zero(columns_, columns_),
                     MatrixXd::Zero(columns_, static_cast<Index>(blocks_.size()))};
@@ -193,15 +205,16 @@ MixedModel::NormalParts MixedModel::normal_parts(double run_correlation) const {
   };
   for (std::size_t b = 0; b < blocks_.size(); ++b)
     for (std::size_t k = 0; k < blocks_[b].size(); ++k) {
-      std::vector<Entry> row;  // of A L: a run less a part of the one before it
+      std::vector<Entry> row;  // of A D⁻¹ L: a run less a part of the one before it
       const auto add = [&](Index run, double weight) {
-        row.push_back({first_column_[static_cast<std::size_t>(run)], weight * own_.row(run)});
+        row.push_back({first_column_[static_cast<std::size_t>(run)],
+                       weight * root.inverse_scatter(run) * own_.row(run)});
       };
       add(blocks_[b][k], k == 0 ? 1 : root.scale());
       if (k > 0 && run_correlation != 0) add(blocks_[b][k - 1], -run_correlation * root.scale());
       for (const Entry& one : row) {
         parts.of_blocks.col(static_cast<Index>(b)).segment(one.first, each) +=
-            (k == 0 ? 1 : root.later()) * one.values.transpose();
+            root.w(blocks_[b][k]) * one.values.transpose();
         for (const Entry& other : row)
           parts.independent.block(one.first, other.first, each, each) +=
               one.values.transpose() * other.values;
@@ -216,9 +229,9 @@ std::vector<MixedModel::Prepared> MixedModel::prepare(double run_correlation,
   std::optional<NormalParts> parts;
   for (const std::size_t r : ratio) {
     result[r].log_xvx = log_of_groups_;
-    if (kRatios[r] == 0 && run_correlation == 0) continue;
+    if (kRatios[r] == 0 && run_correlation == 0 && (scatter_.array() == 1).all()) continue;
     if (!parts) parts = normal_parts(run_correlation);
-    const Root root(blocks_, kRatios[r], run_correlation);
+    const Root root(blocks_, scatter_, kRatios[r], run_correlation);
     Eigen::VectorXd weight(parts->of_blocks.cols());
     for (std::size_t b = 0; b < blocks_.size(); ++b)
       weight(static_cast<Index>(b)) = std::sqrt(kRatios[r] / (1 + kRatios[r] * root.squared_norm(b)));
@@ -234,7 +247,7 @@ std::vector<MixedModel::Prepared> MixedModel::prepare(double run_correlation,
 }
 
 MatrixXd MixedModel::baseline_coefficients(std::size_t stratum, std::size_t ratio, MatrixXd whitened) const {
-  Root(blocks_, kRatios[ratio], run_correlation(stratum)).apply_transposed(whitened);
+  Root(blocks_, run_scatter(stratum), kRatios[ratio], run_correlation(stratum)).apply_transposed(whitened);
   MatrixXd result = MatrixXd::Zero(columns_, whitened.cols());
   for (Index c = 0; c < whitened.cols(); ++c)
     for (Index k = 0; k < own_.cols(); ++k)
@@ -251,8 +264,8 @@ Index MixedModel::dof(std::size_t stratum) const {
 
 double MixedModel::make_log_determinant(std::size_t stratum, std::size_t ratio) const {
   const double correlation = run_correlation(stratum);
-  const Root root(blocks_, kRatios[ratio], correlation);
-  double log_v = 0;
+  const Root root(blocks_, run_scatter(stratum), kRatios[ratio], correlation);
+  double log_v = 2 * run_scatter(stratum).array().log().sum();
   for (std::size_t b = 0; b < blocks_.size(); ++b)
     log_v += static_cast<double>(blocks_[b].size() - 1) * std::log(1 - correlation * correlation) +
              std::log1p(kRatios[ratio] * root.squared_norm(b));
@@ -275,7 +288,7 @@ Stacked MixedModel::stack(std::size_t stratum, const std::vector<const Component
 void MixedModel::project(std::size_t stratum, std::size_t ratio, Stacked& columns) const {
   const Index n = static_cast<Index>(rows_.size());
   Eigen::Map<MatrixXd> by_mode(columns.data(), n, columns.size() / n);
-  const Root root(blocks_, kRatios[ratio], run_correlation(stratum));
+  const Root root(blocks_, run_scatter(stratum), kRatios[ratio], run_correlation(stratum));
   if (strata_[stratum].means()) {
     MatrixXd whitened = by_mode;
     root.apply(whitened);
@@ -290,7 +303,7 @@ void MixedModel::project(std::size_t stratum, std::size_t ratio, Stacked& column
 
 void MixedModel::whiten_transposed(std::size_t stratum, std::size_t ratio, Stacked& projected) const {
   const Index n = static_cast<Index>(rows_.size());
-  Root(blocks_, kRatios[ratio], run_correlation(stratum))
+  Root(blocks_, run_scatter(stratum), kRatios[ratio], run_correlation(stratum))
       .apply_transposed(Eigen::Map<MatrixXd>(projected.data(), n, projected.size() / n));
 }
 
@@ -312,7 +325,7 @@ Stacked MixedModel::baseline_prediction(std::size_t stratum, std::size_t ratio, 
   Stacked result = Stacked::Zero(wanted * modes, columns.cols());
   if (!strata_[stratum].means()) return result;
   MatrixXd by_mode = Eigen::Map<const MatrixXd>(columns.data(), n, modes * columns.cols());
-  whiten(blocks_, kRatios[ratio], run_correlation(stratum), by_mode);
+  whiten(blocks_, run_scatter(stratum), kRatios[ratio], run_correlation(stratum), by_mode);
   const MatrixXd coefficients = baseline_coefficients(stratum, ratio, std::move(by_mode));
   Eigen::Map<MatrixXd> predicted(result.data(), wanted, modes * columns.cols());
   for (std::size_t r = 0; r < rows.size(); ++r) {

@@ -5,8 +5,8 @@
 // The rotors' y are rotated into one common and c − 1 difference modes (each rotor's first divided by its
 // scatter, where they differ in it); the runs' means and each cosine coefficient of their course, common or
 // difference, make a stratum with a run variance σ² and a session variance a σ² of its own. A run's mean may
-// be correlated with that of the run before it by φ: V = σ² (Φ + a 11ᵀ) in each session, Φ_ij = φ^|i − j|.
-// docs/closed-loop.md has the equations.
+// be correlated with that of the run before it by φ, and scatter d times as much as most: V = σ² (DΦD + a
+// 11ᵀ) in each session, Φ_ij = φ^|i − j|, D = diag(d). docs/closed-loop.md has the equations.
 #pragma once
 
 #include "analysis/residual/terms.h"
@@ -29,10 +29,10 @@ inline constexpr std::array<double, 9> kRatios = {0, 0.05, 0.15, 0.4, 1, 2.5, 6,
 /// Columns, each stacked over the modes of one stratum: (runs · modes) × columns.
 using Stacked = Eigen::MatrixXd;
 
-/// (Φ + a 11ᵀ)^(−½), by which columns (a row for each run) are multiplied in place, block by block; the runs
-/// of a block in order of time.
-void whiten(const std::vector<std::vector<Eigen::Index>>& blocks, double session_ratio,
-            double run_correlation, Eigen::Ref<Eigen::MatrixXd> columns);
+/// (DΦD + a 11ᵀ)^(−½), by which columns (a row for each run) are multiplied in place, block by block; the
+/// runs of a block in order of time. `scatter`: d of each row.
+void whiten(const std::vector<std::vector<Eigen::Index>>& blocks, const Eigen::VectorXd& scatter,
+            double session_ratio, double run_correlation, Eigen::Ref<Eigen::MatrixXd> columns);
 
 /// What is fixed by the design and the correlation of neighbouring runs: for some runs of some observations.
 class MixedModel {
@@ -61,6 +61,10 @@ class MixedModel {
   }
   std::size_t ratios() const { return ratios_; }      // 1 where blocks are single rows
   double run_correlation(std::size_t stratum) const;  // 0 for courses
+  /// d of each run; 1 for courses.
+  const Eigen::VectorXd& run_scatter(std::size_t stratum) const {
+    return strata_[stratum].means() ? scatter_ : alike_;
+  }
 
   /// Picks the model's runs and rotates the rotors into modes; one item per column of the result.
   Stacked stack(std::size_t stratum, const std::vector<const Components*>& items) const;
@@ -86,15 +90,15 @@ class MixedModel {
                                     const std::vector<int>& rows) const;
 
   /// Draws data without any effect: session and run scatter of the given σ and ratio, and a correlation of
-  /// neighbouring runs. Stacked, a column for each σ. `sizes`: of each run, over σ, in place of normal
-  /// scatter; its sign is drawn.
+  /// neighbouring runs. Stacked, a column for each σ. `sizes`: of each run, over σ and its own scatter, in
+  /// place of normal scatter; its sign is drawn.
   Stacked simulate(std::size_t stratum, const std::vector<double>& sigma,
                    const std::vector<std::size_t>& ratio, double run_correlation, std::mt19937_64& random,
                    const Eigen::MatrixXd& sizes = {}) const;
 
-  /// How far each run is, over σ, from what the model with `columns` says of it without that run (over 1 −
-  /// h); runs × modes, rms 1; of each stratum, empty of a course. `residual`: what they leave. `sigma`: of
-  /// each stratum.
+  /// How far each run is, over σ and its own scatter, from what the model with `columns` says of it without
+  /// that run (over 1 − h); runs × modes, rms 1; of each stratum, empty of a course. `residual`: what they
+  /// leave. `sigma`: of each stratum.
   std::vector<Eigen::MatrixXd> sizes_left(const std::vector<std::size_t>& ratio,
                                           const std::vector<double>& sigma, const Components& residual,
                                           const std::vector<Components>& columns,
@@ -124,7 +128,7 @@ class MixedModel {
   };
 
   MixedModel(const Observations& observations, std::vector<int> rows, const std::vector<std::size_t>& ratio,
-             const std::array<double, 2>& run_correlation);
+             const RunScatter& scatter);
   void set_groups();
   /// LᵀV⁻¹L = independent − Σ a/(1 + a wᵀw) s sᵀ over the blocks' columns s, since with the root's A and w
   /// V⁻¹ = AᵀA − Σ a/(1 + a wᵀw) Aᵀw wᵀA.
@@ -156,6 +160,7 @@ class MixedModel {
   std::vector<Stratum> strata_;
   std::size_t ratios_ = kRatios.size();
   std::array<double, 2> run_correlation_ = {0, 0};
+  Eigen::VectorXd alike_, scatter_;  // 1, and d, of each run
   /// By ratio; of the rotors' differences only where their runs are correlated otherwise than the means.
   std::array<std::vector<Prepared>, 2> prepared_;
   std::vector<std::vector<double>> log_determinant_;  // stratum, ratio

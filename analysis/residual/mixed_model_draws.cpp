@@ -18,10 +18,7 @@ Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sig
   const double fresh = std::sqrt(1 - run_correlation * run_correlation);
   const bool signs = sizes.size() > 0;
   MatrixXd own = signs ? sizes : MatrixXd::Ones(n, strata_[stratum].modes);  // scatter, over σ
-  if (!signs && observations_.scatter.runs.size() > 0 && strata_[stratum].means()) {
-    own.colwise() = Eigen::VectorXd(observations_.scatter.runs(rows_));
-    own *= std::sqrt(static_cast<double>(own.size())) / own.norm();
-  }
+  own.array().colwise() *= run_scatter(stratum).array();
   Stacked result(own.size(), static_cast<Index>(sigma.size()));
   for (Index i = 0; i < result.cols(); ++i) {
     for (Index k = 0; k < result.rows(); ++k)

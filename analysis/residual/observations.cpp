@@ -31,13 +31,27 @@ std::vector<int> Observations::all_rows() const {
   return all;
 }
 
+Eigen::VectorXd RunScatter::of_runs(const std::vector<int>& rows) const {
+  Eigen::VectorXd result = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(rows.size()));
+  for (const Eigen::VectorXd* scatter : {&runs, &by_condition.runs})
+    if (scatter->size() > 0) result.array() *= (*scatter)(rows).array();
+  return result;
+}
+
+RunScatter RunScatter::subset(const std::vector<int>& kept) const {
+  RunScatter part = *this;
+  for (Eigen::VectorXd* scatter : {&part.runs, &part.by_condition.runs})
+    if (scatter->size() > 0) *scatter = Eigen::VectorXd((*scatter)(kept));
+  return part;
+}
+
 Observations Observations::subset(const std::vector<int>& kept) const {
   Observations part = *this;
   for (Eigen::MatrixXd* matrix : {&part.value, &part.known, &part.y, &part.slopes})
     *matrix = Eigen::MatrixXd((*matrix)(kept, Eigen::all));
   for (Eigen::MatrixXd& course : part.shape) course = Eigen::MatrixXd(course(kept, Eigen::all));
   if (sign.size() > 0) part.sign = Eigen::VectorXd(sign(kept));
-  if (scatter.runs.size() > 0) part.scatter.runs = Eigen::VectorXd(scatter.runs(kept));
+  part.scatter = scatter.subset(kept);
   for (Place& place : part.places) place.weight = Eigen::VectorXd(place.weight(kept));
   part.duration_s = Eigen::VectorXd(duration_s(kept));
   for (Covariate& covariate : part.covariates)

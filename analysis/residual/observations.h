@@ -55,8 +55,17 @@ struct RunScatter {
   std::array<double, 2> run_correlation = {0, 0};
   /// Each rotor's own over their geometric mean; empty: alike (rotor_scatter.h).
   Eigen::VectorXd rotors = {};
-  /// n: each run's over that of most; empty: alike (run_scatter.h). For the data that are drawn only.
+  /// n: each run's over that of most, by location and session; empty: alike (run_scatter.h).
   Eigen::VectorXd runs = {};
+  /// n: each run's over the rms of all, by these conditions; empty: alike (condition_scatter.h).
+  struct ByCondition {
+    std::set<std::string> names = {};
+    Eigen::VectorXd runs = {};
+  } by_condition = {};
+
+  /// Of some runs, by all of these; 1 where all are alike.
+  Eigen::VectorXd of_runs(const std::vector<int>& rows) const;
+  RunScatter subset(const std::vector<int>& kept) const;
 };
 
 /// n runs (rows of a table) by c channels (rotors; 1 for a table).

@@ -59,7 +59,7 @@ std::size_t differences_stratum(const MixedModel& model) {
 VectorXd rotor_scatter(const Observations& observations, const std::vector<int>& rows,
                        const Components& residual, std::mt19937_64& random) {
   Observations seen = observations;
-  seen.scatter = {};
+  seen.scatter = {.by_condition = observations.scatter.by_condition};
   std::vector<Index> alike(static_cast<std::size_t>(observations.channels()));
   std::iota(alike.begin(), alike.end(), Index{0});
   while (alike.size() >= kFewestToCompare) {

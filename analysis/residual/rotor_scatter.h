@@ -14,7 +14,7 @@ namespace tunnelrig {
 /// residuals of a model; empty where they differ by no more than alike rotors' do. The most unlike rotor gets
 /// a scatter of its own where it is beyond all of 200 simulated sets, then the next of those left, down to
 /// two of which nothing says which one scatters; the others share one. From mean absolute values: a single
-/// wild run is not a rotor's scatter.
+/// wild run is not a rotor's scatter. What goes with a condition is allowed for, if it is known.
 Eigen::VectorXd rotor_scatter(const Observations& observations, const std::vector<int>& rows,
                               const Components& residual, std::mt19937_64& random);
 

@@ -89,22 +89,26 @@ void let_differ(const std::vector<int>& number, const std::vector<int>& rows, co
 
 }  // namespace
 
-VectorXd run_scatter(const Observations& observations, const MixedModel& model, const NullFit& variances,
-                     const Components& residual, std::mt19937_64& random) {
-  if (observations.from_table) return {};
+RunSizes run_sizes(const MixedModel& model, const NullFit& variances, const Components& residual,
+                   std::mt19937_64& random) {
   const auto n = static_cast<Index>(model.rows().size());
-  MatrixXd size = MatrixXd::Zero(n, 1), alike = MatrixXd::Zero(n, kAlikeSets);
+  RunSizes result{model.rows(), VectorXd::Zero(n), MatrixXd::Zero(n, kAlikeSets)};
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
     if (!model.strata()[s].means()) continue;
     const std::size_t ratio = variances.ratio[s];
-    size += sizes_of(model, s, ratio, model.stack(s, {&residual}) / variances.sigma[s]);
-    alike += sizes_of(model, s, ratio, model.simulate_unit(s, ratio, kAlikeSets, 0, random));
+    result.left += sizes_of(model, s, ratio, model.stack(s, {&residual}) / variances.sigma[s]).col(0);
+    result.alike += sizes_of(model, s, ratio, model.simulate_unit(s, ratio, kAlikeSets, 0, random));
   }
+  return result;
+}
+
+VectorXd run_scatter(const Observations& observations, const RunSizes& sizes) {
+  if (observations.from_table) return {};
   VectorXd result = VectorXd::Ones(observations.rows());
-  let_differ(observations.group, model.rows(), size, alike, result);
+  let_differ(observations.group, sizes.rows, sizes.left, sizes.alike, result);
   // A session is not wilder for its runs at a wild location.
-  const MatrixXd beside = size.cwiseQuotient(MatrixXd(result(model.rows())));
-  let_differ(observations.block, model.rows(), beside, alike, result);
+  const MatrixXd beside = sizes.left.cwiseQuotient(VectorXd(result(sizes.rows)));
+  let_differ(observations.block, sizes.rows, beside, sizes.alike, result);
   if ((result.array() == 1).all()) return {};
   return result;
 }

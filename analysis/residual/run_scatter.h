@@ -7,13 +7,22 @@
 
 namespace tunnelrig {
 
+/// What is left of each run of a model, over σ, summed over the modes; and of the runs of data sets in which
+/// all scatter alike (a column each).
+struct RunSizes {
+  std::vector<int> rows;
+  Eigen::VectorXd left;
+  Eigen::MatrixXd alike;
+};
+
+/// `residual`: what the model leaves.
+RunSizes run_sizes(const MixedModel& model, const NullFit& variances, const Components& residual,
+                   std::mt19937_64& random);
+
 /// n: of each run its scatter over that of most, where the runs of a group or block scatter more than twice
-/// as much and beyond all of 200 data sets whose runs are alike; elsewhere 1. Runs that the model does not
+/// as much and beyond all of the data sets whose runs are alike; elsewhere 1. Runs that the model does not
 /// hold are like the others of their group. Empty: all are alike, and for tables, whose groups are no repeats
 /// of each other.
-///
-/// `residual`: what the model leaves.
-Eigen::VectorXd run_scatter(const Observations& observations, const MixedModel& model,
-                            const NullFit& variances, const Components& residual, std::mt19937_64& random);
+Eigen::VectorXd run_scatter(const Observations& observations, const RunSizes& sizes);
 
 }  // namespace tunnelrig

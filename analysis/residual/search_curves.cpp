@@ -1,8 +1,8 @@
 // Structure without a name.
+#include "analysis/residual/condition_scatter.h"
 #include "analysis/residual/null_maxima.h"
 #include "analysis/residual/rotor_scatter.h"
 #include "analysis/residual/run_correlation.h"
-#include "analysis/residual/run_scatter.h"
 #include "analysis/residual/search.h"
 
 #include <algorithm>
@@ -79,23 +79,30 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
   const Components residual = rest_beside(curves, known ? critical_ : 0);
   std::mt19937_64 random(settings_.seed * 1000003 + 3000), other(settings_.seed * 1000003 + 4000),
       third(settings_.seed * 1000003 + 5000);
-  RunScatter scatter{.rotors = rotor_scatter(observations_, rows_, residual, other)};
-  const auto set_runs = [&](const MixedModel& model, const NullFit& variances) {
-    scatter.run_correlation = run_correlation(model, variances, residual, random);
-    scatter.runs = run_scatter(observations_, model, variances, residual, third);
+  Observations scattered = observations_;
+  RunScatter& scatter = scattered.scatter = {};
+  const auto variances_of = [&](const MixedModel& model) {
+    return CandidateScan(model, {}, {}).null_fit(residual);
   };
-  if (known || scatter.rotors.size() > 0) {
-    Observations scattered = observations_;
-    scattered.scatter = scatter;
+  // While quiet runs count no more than others, what is left of these has a part of theirs: in steps.
+  constexpr int kMostSteps = 5;
+  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+  for (int step = 0; step < kMostSteps; ++step) {
     const MixedModel model(scattered, rows_);
-    set_runs(model, CandidateScan(model, {}, {}).null_fit(residual));
-  } else {
-    set_runs(*mixed_, fit_.variances);
+    if (!let_scatter_differ(observations_, run_sizes(model, variances_of(model), residual, third), predicted,
+                            third, scatter.by_condition))
+      break;
   }
+  scatter.rotors = rotor_scatter(scattered, rows_, residual, other);
+  const MixedModel model(scattered, rows_);
+  const NullFit variances = variances_of(model);
+  scatter.run_correlation = run_correlation(model, variances, residual, random);
+  scatter.runs = run_scatter(observations_, run_sizes(model, variances, residual, third));
   if (are_alike(scatter.rotors, before.rotors) && (before.runs.size() > 0) == (scatter.runs.size() > 0) &&
+      before.by_condition.names == scatter.by_condition.names &&
       (known || scatter.run_correlation == before.run_correlation))
     return false;
-  observations_.scatter = std::move(scatter);
+  observations_.scatter = scatter;
   begin();
   return true;
 }
@@ -205,8 +212,10 @@ void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
   drop(t, without);
   found.curve = with_trend(found.curve);
   for (std::size_t other = result_.accepted.size(); other-- > 0;) {
-    if (!is_work_of_a_curve(result_.accepted[other].term)) continue;
-    found.instead_of.push_back(result_.accepted[other].term.effect->name);
+    // That forces go with the square of the measured speed is no formula in doubt.
+    const Term& term = result_.accepted[other].term;
+    if (term.effect->theory_only || !is_work_of_a_curve(term)) continue;
+    found.instead_of.push_back(term.effect->name);
     drop(other, fit_without(other));
   }
   fit_.model.curves.back() = found.curve;

@@ -145,6 +145,9 @@ VectorXd distances(const Observations& observations, const Term& first, const Te
   difference -= usual;
   const MixedModel mixed = MixedModel::baseline_alone(observations, rows);
   const MatrixXd by_mode = difference * mixed.mode_matrix();
+  std::vector<int> like;
+  for (const Setting& setting : settings) like.push_back(setting.like);
+  const Eigen::ArrayXd scatter = observations.scatter.of_runs(like);
   VectorXd squares = VectorXd::Zero(by_mode.rows());
   for (std::size_t k = 0; k < mixed.strata().size(); ++k) {
     const MixedModel::Stratum& stratum = mixed.strata()[k];
@@ -152,7 +155,7 @@ VectorXd distances(const Observations& observations, const Term& first, const Te
     const double variance = 2 * std::max(std::pow(fit.variances.sigma[k], 2), 1e-300);
     squares += by_mode.middleCols(stratum.first_mode, stratum.modes).rowwise().squaredNorm() / variance;
   }
-  return squares.cwiseSqrt();
+  return squares.array().sqrt() / scatter;
 }
 
 std::string in_words(const SeparatingRun& run, const Observations& observations) {

@@ -27,20 +27,19 @@ double degrees_of_freedom(const Observations& observations, const JointFit& fit,
 
 namespace {
 
-/// Of each rotor, in y: its own, and what it has in common with the others.
-VectorXd variance_of_a_run(const Observations& observations, const NullFit& variances,
-                           const std::vector<int>& rows) {
+/// Of each run and rotor, in y: its own, and what it has in common with the others.
+MatrixXd variance_of_runs(const Observations& observations, const NullFit& variances,
+                          const std::vector<int>& rows) {
   const MixedModel mixed = MixedModel::baseline_alone(observations, rows);
-  VectorXd result = VectorXd::Zero(observations.channels());
+  const VectorXd scatter = observations.scatter.of_runs(rows);
+  MatrixXd result = MatrixXd::Zero(scatter.size(), observations.channels());
   for (std::size_t s = 0; s < mixed.strata().size(); ++s) {
     const MixedModel::Stratum& stratum = mixed.strata()[s];
     if (!stratum.means()) continue;
-    const double variance = std::pow(variances.sigma[s], 2) * (1 + kRatios[variances.ratio[s]]);
-    result += variance * mixed.rotors_of_modes()
-                             .middleRows(stratum.first_mode, stratum.modes)
-                             .colwise()
-                             .squaredNorm()
-                             .transpose();
+    const VectorXd variance =
+        std::pow(variances.sigma[s], 2) * (scatter.array().square() + kRatios[variances.ratio[s]]);
+    result += variance *
+              mixed.rotors_of_modes().middleRows(stratum.first_mode, stratum.modes).colwise().squaredNorm();
   }
   return result;
 }
@@ -84,7 +83,7 @@ VectorXd distance_of_those_apart(const Observations& observations, const std::ve
 std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
                                      const NullFit& variances, double dof) {
   constexpr double kLeastLeft = 0.02;
-  const VectorXd sigma2 = variance_of_a_run(observations, variances, errors.rows);
+  const MatrixXd sigma2 = variance_of_runs(observations, variances, errors.rows);
   // On the scale of the model, where residuals are normal: of a tenth and of ten times alike.
   MatrixXd residual = -errors.error, left = MatrixXd::Ones(residual.rows(), residual.cols());  // 1 − h
   for (Index r = 0; r < residual.rows(); ++r)
@@ -95,8 +94,8 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
         unit = std::abs(value + errors.error(r, c));  // what was predicted
         residual(r, c) = std::log(std::abs(value) / unit);
       }
-      residual(r, c) /= std::sqrt(sigma2(c));
-      left(r, c) = std::max(2 - std::pow(errors.expected_std(r, c) / unit, 2) / sigma2(c), kLeastLeft);
+      residual(r, c) /= std::sqrt(sigma2(r, c));
+      left(r, c) = std::max(2 - std::pow(errors.expected_std(r, c) / unit, 2) / sigma2(r, c), kLeastLeft);
     }
   const auto missing = residual.array().isNaN();
   const double variance = missing.select(0, residual).squaredNorm() / missing.select(0, left).sum();
