@@ -17,19 +17,6 @@ using Eigen::VectorXd;
 constexpr double kUnlike = 2;  // less makes no structure
 constexpr double kLeastLeft = 1e-3;
 
-/// The size of what is left of each run, over σ, summed over the modes; a column for each data set.
-MatrixXd sizes_of(const MixedModel& model, std::size_t stratum, std::size_t ratio, Stacked data) {
-  model.project(stratum, ratio, data);
-  const auto n = static_cast<Index>(model.rows().size());
-  MatrixXd result(n, data.cols());
-  for (Index set = 0; set < data.cols(); ++set)
-    result.col(set) = Eigen::Map<const MatrixXd>(data.col(set).data(), n, model.strata()[stratum].modes)
-                          .cwiseAbs()
-                          .rowwise()
-                          .sum();
-  return result;
-}
-
 /// Of each set of runs: ln of its mean size over what runs that are alike have there.
 struct Compared {
   VectorXd ln;            // of the data
@@ -89,17 +76,34 @@ void let_differ(const std::vector<int>& number, const std::vector<int>& rows, co
 
 }  // namespace
 
-RunSizes run_sizes(const MixedModel& model, const NullFit& variances, const Components& residual,
-                   std::mt19937_64& random) {
-  const auto n = static_cast<Index>(model.rows().size());
-  RunSizes result{model.rows(), VectorXd::Zero(n), MatrixXd::Zero(n, kAlikeSets)};
+RunSizes run_sizes(const MixedModel& model, const NullFit& variances, const Components& y,
+                   const std::vector<Components>& columns, std::mt19937_64& random) {
+  std::vector<const Components*> items;
+  for (const Components& column : columns) items.push_back(&column);
+  const auto k = static_cast<Index>(items.size()), n = static_cast<Index>(model.rows().size());
+  std::vector<Stacked> data, fitted;  // of each stratum: the measured and the drawn, and the columns
+  MatrixXd information = MatrixXd::Zero(k, k), products = MatrixXd::Zero(k, 1 + kAlikeSets);
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
+    const std::size_t ratio = variances.ratio[s];
+    const Stacked own = model.stack(s, {&y}) / variances.sigma[s];
+    data.emplace_back(own.rows(), 1 + kAlikeSets);
+    data[s] << own, model.simulate_unit(s, ratio, kAlikeSets, 0, random);
+    model.project(s, ratio, data[s]);
+    fitted.push_back(model.stack(s, items) / variances.sigma[s]);
+    if (k == 0) continue;
+    model.project(s, ratio, fitted[s]);
+    information += fitted[s].transpose() * fitted[s];
+    products += fitted[s].transpose() * data[s];
+  }
+  const MatrixXd amplitude =
+      k > 0 ? MatrixXd(information.completeOrthogonalDecomposition().solve(products)) : products;
+  MatrixXd size = MatrixXd::Zero(n, 1 + kAlikeSets);
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
     if (!model.strata()[s].means()) continue;
-    const std::size_t ratio = variances.ratio[s];
-    result.left += sizes_of(model, s, ratio, model.stack(s, {&residual}) / variances.sigma[s]).col(0);
-    result.alike += sizes_of(model, s, ratio, model.simulate_unit(s, ratio, kAlikeSets, 0, random));
+    const MatrixXd left = (data[s] - fitted[s] * amplitude).cwiseAbs();
+    for (Index mode = 0; mode < model.strata()[s].modes; ++mode) size += left.middleRows(mode * n, n);
   }
-  return result;
+  return {model.rows(), size.col(0), size.rightCols(kAlikeSets)};
 }
 
 VectorXd run_scatter(const Observations& observations, const RunSizes& sizes) {

@@ -7,17 +7,16 @@
 
 namespace tunnelrig {
 
-/// What is left of each run of a model, over σ, summed over the modes; and of the runs of data sets in which
-/// all scatter alike (a column each).
+/// What is left of each run beside a model and columns, over σ, summed over the modes; and of the runs of
+/// data sets in which all scatter as the model says (a column each).
 struct RunSizes {
   std::vector<int> rows;
   Eigen::VectorXd left;
   Eigen::MatrixXd alike;
 };
 
-/// `residual`: what the model leaves.
-RunSizes run_sizes(const MixedModel& model, const NullFit& variances, const Components& residual,
-                   std::mt19937_64& random);
+RunSizes run_sizes(const MixedModel& model, const NullFit& variances, const Components& y,
+                   const std::vector<Components>& columns, std::mt19937_64& random);
 
 /// n: of each run its scatter over that of most, where the runs of a group or block scatter more than twice
 /// as much and beyond all of the data sets whose runs are alike; elsewhere 1. Runs that the model does not
