@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 
 constexpr std::size_t kMostConditions = 2;
 constexpr double kLeastSpan = 1.5;  // of the most to the least scatter: less changes nothing
-constexpr double kLeastMore = 1.1;  // likewise, of one that is known already
+constexpr double kLeastMore = 1.1;  // likewise, of a condition that is known already
 constexpr double kMostSpan = 100;   // beyond what a rig does, and what weights should do
 constexpr Index kFewestRuns = 20;
 
@@ -126,31 +126,42 @@ bool is_by_chance(const std::vector<VectorXd>& z, const VectorXd& size, const Ma
   return false;
 }
 
+/// False where runs would be more unlike than weights should say.
+bool multiply(RunScatter::ByCondition& known, const Condition& condition, double gamma,
+              const std::vector<int>& rows) {
+  const VectorXd log = gamma * condition.z;
+  VectorXd runs = log.array().isNaN().select(0, log).array().exp();
+  if (known.runs.size() > 0) runs.array() *= known.runs.array();
+  const VectorXd own = runs(rows);
+  if (own.maxCoeff() > kMostSpan * own.minCoeff()) return false;
+  known.names.insert(condition.name);
+  known.runs = runs / std::sqrt(own.squaredNorm() / static_cast<double>(own.size()));
+  return true;
+}
+
 }  // namespace
 
 bool let_scatter_differ(const Observations& observations, const RunSizes& sizes, const MatrixXd& predicted,
                         std::mt19937_64& random, RunScatter::ByCondition& known) {
   const Sizes of = relative(sizes);
   if (static_cast<Index>(of.rows.size()) < kFewestRuns) return false;
-  std::vector<Condition> conditions = conditions_of(observations, of.rows, predicted);
-  if (known.names.size() >= kMostConditions)
-    std::erase_if(conditions, [&](const Condition& c) { return !known.names.contains(c.name); });
-  if (conditions.empty()) return false;
-  std::vector<VectorXd> z;
-  for (const Condition& condition : conditions) z.emplace_back(condition.z(of.rows));
-  const auto [best, gain] = best_of(z, of.left);
-  const double span = std::abs(gain.gamma) * (z[best].maxCoeff() - z[best].minCoeff());
-  const bool is_new = !known.names.contains(conditions[best].name);
-  if (span < std::log(is_new ? kLeastSpan : kLeastMore)) return false;
-  if (is_by_chance(z, of.left, of.alike, gain.log_likelihood, random)) return false;
-  const VectorXd log = gain.gamma * conditions[best].z;
-  VectorXd runs = log.array().isNaN().select(0, log).array().exp();
-  if (known.runs.size() > 0) runs.array() *= known.runs.array();
-  const VectorXd own = runs(of.rows);
-  if (own.maxCoeff() > kMostSpan * own.minCoeff()) return false;
-  known.names.insert(conditions[best].name);
-  known.runs = runs / std::sqrt(own.squaredNorm() / static_cast<double>(own.size()));
-  return true;
+  const std::vector<Condition> conditions = conditions_of(observations, of.rows, predicted);
+  const auto take_best = [&](bool of_known) {
+    std::vector<VectorXd> z;
+    std::vector<const Condition*> of_z;
+    for (const Condition& condition : conditions)
+      if (known.names.contains(condition.name) == of_known) {
+        z.emplace_back(condition.z(of.rows));
+        of_z.push_back(&condition);
+      }
+    const auto [best, gain] = best_of(z, of.left);
+    if (!(gain.log_likelihood > 0)) return false;
+    const double span = std::abs(gain.gamma) * (z[best].maxCoeff() - z[best].minCoeff());
+    if (span < std::log(of_known ? kLeastMore : kLeastSpan)) return false;
+    if (!of_known && is_by_chance(z, of.left, of.alike, gain.log_likelihood, random)) return false;
+    return multiply(known, *of_z[best], gain.gamma, of.rows);
+  };
+  return take_best(true) || (known.names.size() < kMostConditions && take_best(false));
 }
 
 }  // namespace tunnelrig

@@ -60,7 +60,7 @@ Search::CurveScan Search::scan_curves() const {
 Search::ScatterBeside Search::scatter_by_condition(std::vector<Components> columns,
                                                    std::mt19937_64& random) const {
   // While quiet runs count no more than others, what is left of these has a part of theirs: in steps.
-  constexpr int kMostSteps = 5;
+  constexpr int kMostSteps = 8;
   const Components y = difference(y_, fit_.linear.offset);
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
   Observations scattered = observations_;

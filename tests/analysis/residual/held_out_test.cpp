@@ -80,6 +80,28 @@ TEST_P(HeldOut, ErrorsAreThoseOfDirectLeastSquares) {
   EXPECT_LT((errors.expected_std.cwiseAbs2().rowwise().sum() - expected).norm(), 1e-12);
 }
 
+TEST_P(HeldOut, RunsThatScatterMoreCountLess) {
+  std::mt19937_64 random(test::seed() + 7);
+  Observations o =
+      test::simulate({.channels = GetParam(), .session_ratio = 0, .multiplicative = false}, random);
+  o.scatter.by_condition.runs = normal(o.rows(), 1, random).array().exp();
+  const Split split = split_blocks(o);
+  const HeldOutErrors errors =
+      predict_held_out(o, {o.y}, {}, known_variances(o, 0.002, 0), split.fit, split.test);
+  const VectorXd scatter = o.scatter.of_runs(split.test),
+                 weight = o.scatter.of_runs(split.fit).cwiseInverse();
+  const MatrixXd x = weight.asDiagonal() * test::dense_baseline(o, split.fit, split.fit),
+                 x_test = test::dense_baseline(o, split.fit, split.test);
+  const MatrixXd y = weight.asDiagonal() * MatrixXd(o.y(split.fit, Eigen::all));
+  const MatrixXd predicted = x_test * x.colPivHouseholderQr().solve(y);
+  EXPECT_LT((errors.error - (predicted - o.value(split.test, Eigen::all))).norm(), 1e-9);
+  const VectorXd of_baseline = (x_test * (x.transpose() * x).inverse() * x_test.transpose()).diagonal();
+  const VectorXd expected = 0.002 * (scatter.cwiseAbs2() + of_baseline).cwiseSqrt();
+  EXPECT_LT((errors.expected_std - expected.replicate(1, GetParam())).norm(), 1e-9);
+  const double loss = (scatter.cwiseInverse().asDiagonal() * errors.error).squaredNorm() / 0.002 / 0.002;
+  EXPECT_NEAR(errors.loss(), loss, 1e-9 * loss);
+}
+
 TEST_P(HeldOut, MultiplicativeErrorsAreInTheResponsesUnit) {
   std::mt19937_64 random(test::seed() + 1);
   const Observations o = test::simulate({.channels = GetParam(), .session_ratio = 0}, random);

@@ -17,9 +17,11 @@ using Eigen::VectorXd;
 struct Case {
   int channels;
   std::array<double, 2> run_correlation;
+  bool runs_unlike = false;
 
   friend std::ostream& operator<<(std::ostream& out, const Case& c) {
-    return out << c.channels << " channels, " << c.run_correlation[0] << " and " << c.run_correlation[1];
+    return out << c.channels << " channels, " << c.run_correlation[0] << " and " << c.run_correlation[1]
+               << (c.runs_unlike ? ", runs unlike each other" : "");
   }
 };
 
@@ -33,6 +35,10 @@ struct MixedModelTest : testing::TestWithParam<Case> {
 
   MixedModelTest() {
     observations.scatter.run_correlation = GetParam().run_correlation;
+    if (GetParam().runs_unlike) {
+      observations.scatter.runs = draw(observations.rows(), 1).array().exp();
+      observations.scatter.by_condition.runs = draw(observations.rows(), 1).array().exp();
+    }
     for (int row = 0; row < static_cast<int>(observations.rows()); ++row)
       (row > 4 && row % 5 == 0 ? others : rows).push_back(row);
   }
@@ -45,7 +51,16 @@ struct MixedModelTest : testing::TestWithParam<Case> {
   MatrixXd covariance(const MixedModel& model, std::size_t stratum, std::size_t ratio) const {
     const MixedModel::Stratum& s = model.strata()[stratum];
     const double correlation = s.means() ? GetParam().run_correlation[s.side()] : 0;
-    return test::dense_covariance(observations, rows, kRatios[ratio], correlation);
+    const MatrixXd runs = test::dense_covariance(observations, rows, 0, correlation),
+                   sessions = test::dense_covariance(observations, rows, kRatios[ratio], correlation) - runs;
+    const VectorXd own = scatter(s.means());
+    return own.asDiagonal() * runs * own.asDiagonal() + sessions;
+  }
+  VectorXd scatter(bool means) const {
+    VectorXd result = VectorXd::Ones(static_cast<Index>(rows.size()));
+    if (means && GetParam().runs_unlike)
+      result = observations.scatter.runs(rows).cwiseProduct(observations.scatter.by_condition.runs(rows));
+    return result;
   }
   static MatrixXd part(const MatrixXd& stacked, Index n, Index mode) {
     return stacked.middleRows(mode * n, n);
@@ -73,8 +88,10 @@ TEST_P(MixedModelTest, WhiteningIsARootOfTheInverseCovariance) {
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
     for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
       MatrixXd root = MatrixXd::Identity(n, n);
-      whiten(model.blocks(), kRatios[ratio], model.run_correlation(s), root);
-      EXPECT_LT((root.transpose() * root - covariance(model, s, ratio).inverse()).norm(), 1e-10)
+      whiten(model.blocks(), scatter(model.strata()[s].means()), kRatios[ratio], model.run_correlation(s),
+             root);
+      const MatrixXd inverse = covariance(model, s, ratio).inverse();
+      EXPECT_LT((root.transpose() * root - inverse).norm(), 1e-10 * inverse.norm())
           << "stratum " << s << ", ratio " << kRatios[ratio];
     }
   }
@@ -90,7 +107,8 @@ TEST_P(MixedModelTest, WhitenedSimulationsHaveTheIdentityAsCovariance) {
                                     std::vector<std::size_t>(kSets, ratio), model.run_correlation(s), random);
       const auto n = static_cast<Index>(rows.size());
       Eigen::Map<MatrixXd> by_mode(data.data(), n, data.size() / n);
-      whiten(model.blocks(), kRatios[ratio], model.run_correlation(s), by_mode);
+      whiten(model.blocks(), scatter(model.strata()[s].means()), kRatios[ratio], model.run_correlation(s),
+             by_mode);
       const MatrixXd covariance = data * data.transpose() / (sigma * sigma * kSets);
       const MatrixXd excess = covariance - MatrixXd::Identity(data.rows(), data.rows());
       // standard errors 1/√N off the diagonal and √(2/N) on it
@@ -121,7 +139,7 @@ TEST_P(MixedModelTest, ProjectionTakesOutWhatTheBaselineCanAbsorb) {
           y.transpose() * vy - vy.transpose() * x * (x.transpose() * vx).inverse() * x.transpose() * vy;
       for (Index mode = 0; mode < model.strata()[s].modes; ++mode) {
         const MatrixXd left = part(projected, n, mode);
-        EXPECT_LT((left.transpose() * left - products).norm(), 1e-9);
+        EXPECT_LT((left.transpose() * left - products).norm(), 1e-9 * products.norm());
       }
     }
   }
@@ -207,7 +225,8 @@ TEST(MixedModel, BlocksOfSingleRowsHaveOneRatio) {
 
 INSTANTIATE_TEST_SUITE_P(Rotors, MixedModelTest,
                          testing::Values(Case{1, {0, 0}}, Case{4, {0, 0}}, Case{1, {0.6, 0}},
-                                         Case{4, {0.3, 0.6}}, Case{4, {0.4, 0.4}}));
+                                         Case{4, {0.3, 0.6}}, Case{4, {0.4, 0.4}}, Case{1, {0, 0}, true},
+                                         Case{4, {0.3, 0.6}, true}));
 
 /// Estimated through everything that the baseline takes from the data.
 TEST(RunCorrelation, IsFoundWhereItIsAndNowhereElse) {
