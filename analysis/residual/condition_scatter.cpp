@@ -1,6 +1,7 @@
 #include "analysis/residual/condition_scatter.h"
 
 #include "analysis/residual/alike.h"
+#include "analysis/residual/run_correlation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,12 +20,13 @@ using Eigen::VectorXd;
 constexpr std::size_t kMostConditions = 2;
 constexpr double kLeastSpan = 1.5;  // of the most to the least scatter: less changes nothing
 constexpr double kLeastMore = 1.1;  // likewise, of a condition that is known already
-constexpr double kMostSpan = 100;   // beyond what a rig does, and what weights should do
+constexpr double kMostSpan = 20;    // a weight of 400: the calmest runs are not all that counts
 constexpr Index kFewestRuns = 20;
 
 struct Condition {
   std::string name;
-  VectorXd z;  // n, its mean over the runs that count 0; NaN where it is not known
+  VectorXd
+      z;  // n, its mean over the runs that count 0, and within what these have; NaN where it is not known
 };
 
 /// By how much the likelihood of sizes of Laplace's distribution, whose tails are heavy, is larger where
@@ -74,6 +76,20 @@ Sizes relative(const RunSizes& sizes) {
   return result;
 }
 
+/// Between which all but a few lie, who should not say what others scatter.
+struct Inner {
+  double low, high;
+};
+
+Inner inner(VectorXd values) {
+  constexpr double kFew = 0.025;  // at either end
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double share) {
+    return values(static_cast<Index>(share * static_cast<double>(values.size())));
+  };
+  return {at(kFew), at(1 - kFew)};
+}
+
 std::vector<Condition> conditions_of(const Observations& observations, const std::vector<int>& rows,
                                      const MatrixXd& predicted) {
   constexpr double kRatio = 2;       // values that differ by less differ alike as their logarithms do
@@ -81,8 +97,11 @@ std::vector<Condition> conditions_of(const Observations& observations, const std
   std::vector<Condition> result;
   const auto add = [&](const std::string& name, VectorXd z) {
     const VectorXd own = z(rows);
-    if (own.array().isNaN().any() || !(own.maxCoeff() > own.minCoeff())) return;
-    z.array() -= own.mean();
+    if (own.array().isNaN().any()) return;
+    const auto [low, high] = inner(own);
+    if (!(high > low)) return;
+    z = z.array().isNaN().select(z, z.cwiseMax(low).cwiseMin(high));
+    z.array() -= VectorXd(z(rows)).mean();
     result.push_back({name, std::move(z)});
   };
   const VectorXd size = predicted.cwiseAbs().rowwise().mean();
@@ -126,17 +145,17 @@ bool is_by_chance(const std::vector<VectorXd>& z, const VectorXd& size, const Ma
   return false;
 }
 
-/// False where runs would be more unlike than weights should say.
-bool multiply(RunScatter::ByCondition& known, const Condition& condition, double gamma,
+/// Within what most of the runs that count have: what two conditions say of another pair of both is a guess.
+void multiply(RunScatter::ByCondition& known, const Condition& condition, double gamma,
               const std::vector<int>& rows) {
   const VectorXd log = gamma * condition.z;
   VectorXd runs = log.array().isNaN().select(0, log).array().exp();
   if (known.runs.size() > 0) runs.array() *= known.runs.array();
+  const Inner of_most = inner(runs(rows));
+  runs = runs.cwiseMax(std::max(of_most.low, of_most.high / kMostSpan)).cwiseMin(of_most.high);
   const VectorXd own = runs(rows);
-  if (own.maxCoeff() > kMostSpan * own.minCoeff()) return false;
   known.names.insert(condition.name);
   known.runs = runs / std::sqrt(own.squaredNorm() / static_cast<double>(own.size()));
-  return true;
 }
 
 }  // namespace
@@ -145,6 +164,9 @@ bool let_scatter_differ(const Observations& observations, const RunSizes& sizes,
                         std::mt19937_64& random, RunScatter::ByCondition& known) {
   const Sizes of = relative(sizes);
   if (static_cast<Index>(of.rows.size()) < kFewestRuns) return false;
+  // What goes on from row to row is no scatter: the model has the wrong shape there.
+  if (observations.blocks_are_rows && row_correlation(observations, sizes.rows, sizes.common) > 0)
+    return false;
   const std::vector<Condition> conditions = conditions_of(observations, of.rows, predicted);
   const auto take_best = [&](bool of_known) {
     std::vector<VectorXd> z;
@@ -159,7 +181,8 @@ bool let_scatter_differ(const Observations& observations, const RunSizes& sizes,
     const double span = std::abs(gain.gamma) * (z[best].maxCoeff() - z[best].minCoeff());
     if (span < std::log(of_known ? kLeastMore : kLeastSpan)) return false;
     if (!of_known && is_by_chance(z, of.left, of.alike, gain.log_likelihood, random)) return false;
-    return multiply(known, *of_z[best], gain.gamma, of.rows);
+    multiply(known, *of_z[best], gain.gamma, of.rows);
+    return true;
   };
   return take_best(true) || (known.names.size() < kMostConditions && take_best(false));
 }

@@ -1,5 +1,6 @@
 // What the conditions of the runs cannot show.
 #include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/run_correlation.h"
 
 #include <algorithm>
 #include <array>
@@ -256,22 +257,12 @@ void warn_of_shared_conditions(const Observations& observations, Explanation& ex
 }
 
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation) {
-  constexpr double kFarFromIndependent = 3;  // standard deviations of 1/√n
   if (!observations.blocks_are_rows) return;
   warn_of_shared_conditions(observations, explanation);
   VectorXd residual = explanation.residual_after.col(0);
   if (observations.multiplicative) residual = residual.array() / observations.value.col(0).array();
-  double products = 0, pairs = 0;
-  for (Index r = 1; r < residual.size(); ++r) {
-    const auto row = static_cast<std::size_t>(r);
-    if (observations.group[row] != observations.group[row - 1]) continue;
-    products += residual(r) * residual(r - 1);
-    ++pairs;
-  }
-  const double variance = residual.squaredNorm() / static_cast<double>(residual.size());
-  if (pairs == 0 || !(variance > 0)) return;
-  const double correlation = products / pairs / variance;
-  if (correlation * std::sqrt(pairs) < kFarFromIndependent) return;
+  const double correlation = row_correlation(observations, observations.all_rows(), residual);
+  if (correlation == 0) return;
   explanation.warnings.push_back(fmt::format(
       "rows resemble the row before them (correlation {:.2f}) and are taken as independent: names and "
       "p may be wrong; rows that belong together want a block of their own (blocks = a column, or "

@@ -63,4 +63,20 @@ std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fi
   return result;
 }
 
+double row_correlation(const Observations& observations, const std::vector<int>& rows,
+                       const Eigen::VectorXd& residual) {
+  constexpr double kFarFromIndependent = 3;  // standard deviations of 1/√n
+  double products = 0, pairs = 0;
+  for (std::size_t r = 1; r < rows.size(); ++r) {
+    const auto row = static_cast<std::size_t>(rows[r]), before = static_cast<std::size_t>(rows[r - 1]);
+    if (observations.group[row] != observations.group[before]) continue;
+    products += residual(static_cast<Index>(r)) * residual(static_cast<Index>(r) - 1);
+    ++pairs;
+  }
+  const double variance = residual.squaredNorm() / static_cast<double>(residual.size());
+  if (pairs == 0 || !(variance > 0)) return 0;
+  const double correlation = products / pairs / variance;
+  return correlation * std::sqrt(pairs) < kFarFromIndependent ? 0 : correlation;
+}
+
 }  // namespace tunnelrig

@@ -16,4 +16,10 @@ namespace tunnelrig {
 std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fit, const Components& residual,
                                       std::mt19937_64& random);
 
+/// Of a table's rows, which are independent in the model: the correlation of what is left of a row with what
+/// is left of the one before it in `rows`, where both are of one group. 0 within three standard deviations of
+/// that of independent rows.
+double row_correlation(const Observations& observations, const std::vector<int>& rows,
+                       const Eigen::VectorXd& residual);
+
 }  // namespace tunnelrig

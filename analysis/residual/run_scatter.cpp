@@ -103,7 +103,8 @@ RunSizes run_sizes(const MixedModel& model, const NullFit& variances, const Comp
     const MatrixXd left = (data[s] - fitted[s] * amplitude).cwiseAbs();
     for (Index mode = 0; mode < model.strata()[s].modes; ++mode) size += left.middleRows(mode * n, n);
   }
-  return {model.rows(), size.col(0), size.rightCols(kAlikeSets)};
+  const VectorXd common = data[0].col(0).head(n) - fitted[0].topRows(n) * amplitude.col(0);
+  return {model.rows(), size.col(0), common, size.rightCols(kAlikeSets)};
 }
 
 VectorXd run_scatter(const Observations& observations, const RunSizes& sizes) {

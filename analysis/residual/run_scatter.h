@@ -12,6 +12,7 @@ namespace tunnelrig {
 struct RunSizes {
   std::vector<int> rows;
   Eigen::VectorXd left;
+  Eigen::VectorXd common;  // of what rotors have in common, with its sign
   Eigen::MatrixXd alike;
 };
 
