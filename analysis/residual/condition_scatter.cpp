@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,10 +22,11 @@ constexpr double kLeastMore = 1.1;  // likewise, of a condition that is known al
 constexpr double kMostSpan = 20;    // a weight of 400: the calmest runs are not all that counts
 constexpr Index kFewestRuns = 20;
 
+/// z of n runs: its mean over those that count is 0, it lies within what these have, and is NaN where it is
+/// not known.
 struct Condition {
   std::string name;
-  VectorXd
-      z;  // n, its mean over the runs that count 0, and within what these have; NaN where it is not known
+  VectorXd z;
 };
 
 /// By how much the likelihood of sizes of Laplace's distribution, whose tails are heavy, is larger where
@@ -145,7 +145,8 @@ bool is_by_chance(const std::vector<VectorXd>& z, const VectorXd& size, const Ma
   return false;
 }
 
-/// Within what most of the runs that count have: what two conditions say of another pair of both is a guess.
+/// By e^(γz), within what most of the runs that count have: what two conditions say of values that they never
+/// had together is a guess.
 void multiply(RunScatter::ByCondition& known, const Condition& condition, double gamma,
               const std::vector<int>& rows) {
   const VectorXd log = gamma * condition.z;

@@ -112,10 +112,10 @@ class Search {
   std::vector<Eigen::MatrixXd> sizes_beside(const JointFit& fit, const Candidate& candidate,
                                             const CandidateFit& found) const;
 
-  // structure without a name: search_curves.cpp
-  /// Whether one rotor scatters more than another, or neighbouring runs resemble each other, beside the model
-  /// and the best curve, whose own part must not count as scatter. Then the search has begun again, with such
-  /// scatter.
+  // what runs scatter like: search_scatter.cpp
+  /// Whether runs, rotors or locations scatter unlike each other, or neighbouring runs resemble each other,
+  /// beside the model and the best curve, whose own part must not count as scatter. Then the search has begun
+  /// again, with such scatter.
   bool begin_with_scatter_of(const CurveScan& curves);
   /// What runs scatter with beside columns, and how likely both are.
   struct ScatterBeside {
@@ -127,6 +127,8 @@ class Search {
   /// Beside the model and the best curve, if that has this evidence; or without the curve, where scatter is
   /// likelier.
   ScatterBeside scatter_beside(const CurveScan& curves, double least_evidence, std::mt19937_64& random) const;
+
+  // structure without a name: search_curves.cpp
   /// All curves on top of the model.
   CurveScan scan_curves() const;
   /// `first`: the curves on top of the model as it is.
