@@ -119,7 +119,8 @@ void Search::drop_what_a_curve_replaces() {
   for (std::size_t t = result_.accepted.size(); t-- > 0;) {
     if (t >= result_.accepted.size()) continue;  // gone with another
     const Term term = result_.accepted[t].term;
-    if (term.per_group) continue;  // stands in the baseline
+    // Those of groups stand in the baseline; that forces go with the square of the speed is not in doubt.
+    if (term.per_group || term.effect->theory_only) continue;
     const bool outshone = outshone_by_curve(term);
     const JointFit without = fit_without(t);
     // What two conditions do together is not what one of them does.
@@ -153,7 +154,6 @@ void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
   drop(t, without);
   found.curve = with_trend(found.curve);
   for (std::size_t other = result_.accepted.size(); other-- > 0;) {
-    // That forces go with the square of the measured speed is no formula in doubt.
     const Term& term = result_.accepted[other].term;
     if (term.effect->theory_only || !is_work_of_a_curve(term)) continue;
     found.instead_of.push_back(term.effect->name);

@@ -5,6 +5,7 @@
 #include "support/seeds.h"
 
 #include <cmath>
+#include <numbers>
 
 #include <gmock/gmock.h>
 
@@ -116,6 +117,40 @@ TEST_F(Gates, OneRotorMayDifferFromWhatAllDo) {
   EXPECT_EQ(e.adopted.size(), 2u) << explanation_text(e);
   EXPECT_LT(e.after.held_out_rmse, 1.3 * e.noise_floor);
   EXPECT_TRUE(e.unknown.empty()) << explanation_text(e);
+}
+
+/// That thrust goes with the square of the speed is not what a curve over the speed puts in doubt.
+TEST_F(Gates, TheSquareOfTheSpeedStaysBesideACurveOverTheSpeed) {
+  Observations o = observations();
+  add_speed(o, 60, 0);
+  const VectorXd speed = o.find("speed_rpm")->value.col(0);
+  MatrixXd y = o.y;
+  y.colwise() += VectorXd(0.02 * (4 * std::numbers::pi * (speed.array() - 4940) / 120).cos());  // resonances
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  EXPECT_THAT(names(e), Contains("rotor_speed")) << explanation_text(e);
+  ASSERT_EQ(e.unknown.size(), 1u) << explanation_text(e);
+  EXPECT_EQ(e.unknown[0].covariate, "speed_rpm");
+}
+
+/// Between them a wave has any height.
+TEST_F(Gates, FourSpeedsThatScatterALittleAreNoPlaceForWaves) {
+  Observations o = observations();
+  std::normal_distribution<double> scatter(0, 3);
+  Covariate speed{"speed_rpm", MatrixXd(o.rows(), 1)}, any = speed;
+  any.name = "fan_rpm";
+  for (Index row = 0; row < o.rows(); ++row) {
+    speed.value(row, 0) = 3500 + 1000 * static_cast<double>(row % 4) + scatter(random);
+    any.value(row, 0) = 3500 + 500 * scatter(random);
+  }
+  o.covariates = {speed, any};
+  bool of_any = false;
+  for (const Curve& curve : curves_to_try(o, o.all_rows())) {
+    if (curve.shape != CurveShape::kWaves) continue;
+    EXPECT_NE(curve.covariate, "speed_rpm");
+    of_any = of_any || curve.covariate == "fan_rpm";
+  }
+  EXPECT_TRUE(of_any);
 }
 
 }  // namespace
