@@ -87,7 +87,7 @@ void Search::doubt_formulas() {
   for (std::size_t t = result_.accepted.size(); t-- > 0;) {
     if (t >= result_.accepted.size()) continue;  // gone with another
     const Term term = result_.accepted[t].term;
-    if (term.per_group || term.effect->parameters.size() > 1 ||
+    if (term.per_group || term.effect->theory_only || term.effect->parameters.size() > 1 ||
         static_cast<int>(result_.curves.size()) >= settings_.most_curves)
       continue;
     for (const Curve& curve : curves_) {
