@@ -1,6 +1,6 @@
 #include "analysis/residual/likelihood.h"
 
-#include "calibration/distributions.h"
+#include "analysis/residual/evidence_table.h"
 
 #include <algorithm>
 #include <array>
@@ -19,32 +19,16 @@ constexpr int kMostColumns = 24;
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostColumns, 1>;
 
-/// −log10 of the upper tail of F(k, N − k) at a likelihood ratio; tabulated, since it is asked a million
-/// times.
-class EvidenceTable {
- public:
-  EvidenceTable(int columns, double observations) {
-    const double k = columns;
-    for (std::size_t i = 0; i < kEntries; ++i) {
-      const double ratio = kStep * static_cast<double>(i);
-      const double f = std::expm1(2 * ratio / observations) * (observations - k) / k;
-      const double p = f_upper_p(f, k, observations - k);
-      entries_[i] = p > 1e-290 ? -std::log10(p) : entries_[i - 1] + kStep / std::numbers::ln10;
-    }
-  }
-  double operator()(double ratio) const {
-    const double at = ratio / kStep;
-    if (at >= kEntries - 1)
-      return entries_[kEntries - 1] + (ratio - kStep * (kEntries - 1)) / std::numbers::ln10;
-    const auto i = static_cast<std::size_t>(at);
-    return entries_[i] + (at - static_cast<double>(i)) * (entries_[i + 1] - entries_[i]);
-  }
-
- private:
-  static constexpr std::size_t kEntries = 1500;
-  static constexpr double kStep = 0.1;
-  std::array<double, kEntries> entries_{};
-};
+/// Every other one of `count` independent jobs in a thread of its own.
+template <class Job>
+void in_two_threads(std::size_t count, const Job& job) {
+  const auto work = [&](std::size_t k) {
+    for (; k < count; k += 2) job(k);
+  };
+  std::thread second(work, 1);
+  work(0);
+  second.join();
+}
 
 /// One stratum at one ratio: products of all columns with each other.
 struct Products {
@@ -65,8 +49,11 @@ struct CandidateScan::Impl {
   const MixedModel& model;
   Index adopted = 0;
   std::vector<Candidate> candidates;
-  std::vector<Index> first;                     // column of each candidate
-  std::vector<Stacked> stacked;                 // of each stratum: adopted first, then all candidates'
+  std::vector<Index> first;  // column of each candidate
+  Index all_columns = 0;     // adopted first, then all candidates'
+  /// Of each stratum those that are not 0 there, and which they are: few effects change a run's course.
+  std::vector<Stacked> stacked;
+  std::vector<std::vector<Index>> used;
   std::vector<std::vector<Products>> products;  // stratum, ratio
   std::map<std::pair<int, Index>, EvidenceTable> tables;
   std::vector<const EvidenceTable*> table_of;
@@ -80,20 +67,34 @@ struct CandidateScan::Impl {
       first.push_back(static_cast<Index>(items.size()));
       for (const Components& column : candidate.columns) items.push_back(&column);
     }
+    all_columns = static_cast<Index>(items.size());
     touches.assign(candidates.size(), std::vector<bool>(model.strata().size(), false));
-    for (std::size_t s = 0; s < model.strata().size(); ++s) {
-      stacked.push_back(model.stack(s, items));
-      products.emplace_back();
-      for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio)
-        products[s].push_back(multiply(s, ratio, stacked[s]));
-      mark_touched(s);
-    }
+    for (std::size_t s = 0; s < model.strata().size(); ++s) stack_used(s, items);
+    products.assign(model.strata().size(), std::vector<Products>(model.ratios()));
+    in_two_threads(model.strata().size() * model.ratios(), [&](std::size_t k) {
+      const std::size_t s = k / model.ratios(), ratio = k % model.ratios();
+      products[s][ratio] = multiply(s, ratio, stacked[s]);
+    });
+    for (std::size_t s = 0; s < model.strata().size(); ++s) mark_touched(s);
     for (std::size_t i = 0; i < candidates.size(); ++i) table_of.push_back(table_for(i));
   }
 
-  Products multiply(std::size_t s, std::size_t ratio, Stacked c) const {
+  void stack_used(std::size_t s, const std::vector<const Components*>& items) {
+    used.emplace_back();
+    std::vector<const Components*> of_stratum;
+    for (std::size_t i = 0; i < items.size(); ++i)
+      if (!(*items[i])[model.strata()[s].component].isZero(0)) {
+        used[s].push_back(static_cast<Index>(i));
+        of_stratum.push_back(items[i]);
+      }
+    stacked.push_back(model.stack(s, of_stratum));
+  }
+
+  Products multiply(std::size_t s, std::size_t ratio, Stacked projected) const {
     Products result;
-    model.project(s, ratio, c);
+    model.project(s, ratio, projected);
+    Stacked c = Stacked::Zero(projected.rows(), all_columns);
+    c(Eigen::all, used[s]) = projected;
     result.adopted_adopted = c.leftCols(adopted).transpose() * c.leftCols(adopted);
     result.adopted_candidate = c.leftCols(adopted).transpose() * c;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -124,17 +125,18 @@ struct CandidateScan::Impl {
   using Data = std::vector<std::vector<DataProducts>>;  // stratum, ratio
 
   Data multiply_data(const std::vector<Stacked>& data) const {
-    Data result(data.size());
-    for (std::size_t s = 0; s < data.size(); ++s) {
-      for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
-        Stacked projected = data[s];
-        model.project(s, ratio, projected);
-        result[s].push_back({projected.colwise().squaredNorm().transpose(), {}});
-        // In place of the columns' projections at every ratio, which would fill the memory.
-        model.whiten_transposed(s, ratio, projected);
-        result[s].back().columns = stacked[s].transpose() * projected;
-      }
-    }
+    Data result(data.size(), std::vector<DataProducts>(model.ratios()));
+    in_two_threads(data.size() * model.ratios(), [&](std::size_t k) {
+      const std::size_t s = k / model.ratios(), ratio = k % model.ratios();
+      DataProducts& products_of = result[s][ratio];
+      Stacked projected = data[s];
+      model.project(s, ratio, projected);
+      products_of.squares = projected.colwise().squaredNorm().transpose();
+      // In place of the columns' projections at every ratio, which would fill the memory.
+      model.whiten_transposed(s, ratio, projected);
+      products_of.columns = MatrixXd::Zero(all_columns, projected.cols());
+      products_of.columns(used[s], Eigen::all) = stacked[s].transpose() * projected;
+    });
     return result;
   }
 
@@ -147,6 +149,12 @@ struct CandidateScan::Impl {
     SmallVector amplitude;  // adopted, then the candidate's
     double log_likelihood = 0;
   };
+
+  /// Whether adopted columns or the candidate's are other than 0 in a stratum.
+  bool concerns(int candidate, std::size_t s) const {
+    return (!used[s].empty() && used[s][0] < adopted) ||
+           (candidate >= 0 && touches[static_cast<std::size_t>(candidate)][s]);
+  }
 
   /// Generalised least squares of all strata together, their variances found by two reweightings; candidate
   /// −1: none.
@@ -162,11 +170,13 @@ struct CandidateScan::Impl {
       for (int pass = 0; pass < 2; ++pass) {
         SmallMatrix a = SmallMatrix::Zero(k, k);
         SmallVector b = SmallVector::Zero(k);
-        for (std::size_t s = 0; s < strata; ++s) accumulate(data, set, candidate, s, state, a, b);
+        for (std::size_t s = 0; s < strata; ++s)
+          if (concerns(candidate, s)) accumulate(data, set, candidate, s, state, a, b);
         a.diagonal().array() *= 1 + 1e-12;
         a.diagonal().array() += 1e-300;
         state.amplitude = a.ldlt().solve(b);
-        for (std::size_t s = 0; s < strata; ++s) state.rss[s] = residual(data, set, candidate, s, state);
+        for (std::size_t s = 0; s < strata; ++s)
+          if (concerns(candidate, s)) state.rss[s] = residual(data, set, candidate, s, state);
       }
     }
     state.log_likelihood = 0;
@@ -351,23 +361,17 @@ std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::si
   }
   const Impl::Data products = impl_->multiply_data(data);
   std::vector<double> maxima(count, 0.0);
-  const auto work = [&](std::size_t begin, std::size_t step) {
-    for (std::size_t set = begin; set < count; set += step) {
-      const Impl::State state = impl_->best_without(products, static_cast<Index>(set));
-      for (std::size_t i = 0; i < impl_->candidates.size(); ++i) {
-        // Within a factor of a hundred of the largest so far, a better variance may still make it the
-        // largest.
-        const double threshold = std::max(0.5, maxima[set] - 2);
-        maxima[set] = std::max(
-            maxima[set],
-            impl_->fit_candidate(products, static_cast<Index>(set), static_cast<int>(i), state, threshold)
-                .evidence);
-      }
+  in_two_threads(count, [&](std::size_t set) {
+    const Impl::State state = impl_->best_without(products, static_cast<Index>(set));
+    for (std::size_t i = 0; i < impl_->candidates.size(); ++i) {
+      // Within a factor of a hundred of the largest so far, a better variance may still make it the largest.
+      const double threshold = std::max(0.5, maxima[set] - 2);
+      maxima[set] = std::max(
+          maxima[set],
+          impl_->fit_candidate(products, static_cast<Index>(set), static_cast<int>(i), state, threshold)
+              .evidence);
     }
-  };
-  std::thread second(work, 1, 2);
-  work(0, 2);
-  second.join();
+  });
   return maxima;
 }
 
