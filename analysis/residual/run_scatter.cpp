@@ -89,7 +89,7 @@ RunSizes run_sizes(const MixedModel& model, const NullFit& variances, const Comp
     data.emplace_back(own.rows(), 1 + kAlikeSets);
     data[s] << own, model.simulate_unit(s, ratio, kAlikeSets, 0, random);
     model.project(s, ratio, data[s]);
-    fitted.push_back(model.stack(s, items) / variances.sigma[s]);
+    fitted.emplace_back(model.stack(s, items) / variances.sigma[s]);
     if (k == 0) continue;
     model.project(s, ratio, fitted[s]);
     information += fitted[s].transpose() * fitted[s];
