@@ -1,6 +1,7 @@
 #include "analysis/residual/condition_scatter.h"
 
 #include "analysis/residual/alike.h"
+#include "analysis/residual/curves.h"
 #include "analysis/residual/run_correlation.h"
 
 #include <algorithm>
@@ -109,8 +110,7 @@ std::vector<Condition> conditions_of(const Observations& observations, const std
   if (largest > 0)
     add("the predicted " + observations.response, size.cwiseMax(kNothing * largest).array().log());
   for (const Covariate& covariate : observations.covariates)
-    if (!covariate.per_channel() && covariate.labels.empty() &&
-        !observations.not_usable.contains(covariate.name) && !covariate.value.array().isNaN().any()) {
+    if (!covariate.per_channel() && covariate.labels.empty() && can_be_followed(observations, covariate)) {
       const VectorXd x = covariate.value.col(0);
       add(covariate.name, x);
       if (x.minCoeff() > 0 && x.maxCoeff() > kRatio * x.minCoeff()) add(covariate.name, x.array().log());
@@ -159,8 +159,8 @@ void multiply(RunScatter::ByCondition& known, const Condition& condition, double
   known.runs = runs / std::sqrt(own.squaredNorm() / static_cast<double>(own.size()));
 }
 
-}  // namespace
-
+/// Lets `known` go with one condition more, or more with one that it has: where `sizes`, of a model with what
+/// is known, do, beside those of data sets whose runs are alike, and beside the same dealt out anew.
 bool let_scatter_differ(const Observations& observations, const RunSizes& sizes, const MatrixXd& predicted,
                         std::mt19937_64& random, RunScatter::ByCondition& known) {
   const Sizes of = relative(sizes);
@@ -186,6 +186,26 @@ bool let_scatter_differ(const Observations& observations, const RunSizes& sizes,
     return true;
   };
   return take_best(true) || (known.names.size() < kMostConditions && take_best(false));
+}
+
+}  // namespace
+
+ScatterFit condition_scatter(const Observations& observations, const std::vector<int>& rows,
+                             const Components& y, const std::vector<Components>& columns,
+                             const MatrixXd& predicted, std::mt19937_64& random) {
+  // While calm runs count no more than others, what is left of them has a part of theirs: in steps.
+  constexpr int kMostSteps = 8;
+  Observations scattered = observations;
+  scattered.scatter = {};
+  ScatterFit result;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const MixedModel model(scattered, rows);
+    result = {scattered.scatter.by_condition, CandidateScan(model, columns, {}).null_fit(y)};
+    if (!let_scatter_differ(observations, run_sizes(model, result.variances, y, columns, random), predicted,
+                            random, scattered.scatter.by_condition))
+      break;
+  }
+  return result;
 }
 
 }  // namespace tunnelrig

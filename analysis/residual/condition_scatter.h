@@ -8,12 +8,16 @@
 
 namespace tunnelrig {
 
-/// Lets `known` go with one condition more, or more with one that it has: where `sizes`, of a model with what
-/// is known, do, beside those of data sets whose runs are alike, and beside the same dealt out anew. A run's
-/// scatter goes with e^(γz), z a condition, its logarithm, or that of the response that is `predicted` (n ×
-/// c).
-bool let_scatter_differ(const Observations& observations, const RunSizes& sizes,
-                        const Eigen::MatrixXd& predicted, std::mt19937_64& random,
-                        RunScatter::ByCondition& known);
+struct ScatterFit {
+  RunScatter::ByCondition by_condition;
+  NullFit variances;  // with it, beside the columns
+};
+
+/// What the runs of y scatter with beside a baseline and columns: e^(γz), z a condition, its logarithm, or
+/// that of the response that is `predicted` (n × c); nothing where sizes of what is left go with a condition
+/// no more than those of data sets whose runs are alike, or than the same dealt out anew.
+ScatterFit condition_scatter(const Observations& observations, const std::vector<int>& rows,
+                             const Components& y, const std::vector<Components>& columns,
+                             const Eigen::MatrixXd& predicted, std::mt19937_64& random);
 
 }  // namespace tunnelrig

@@ -116,12 +116,6 @@ std::vector<Place> places_to_try(const Observations& observations, const std::ve
   return result;
 }
 
-/// Numbers that differ between the runs.
-bool can_be_followed(const Observations& observations, const Covariate& covariate) {
-  return !observations.not_usable.contains(covariate.name) && covariate.value.allFinite() &&
-         covariate.value.maxCoeff() > covariate.value.minCoeff();
-}
-
 /// What two conditions do together and neither does alone: the product of both, each from its mean.
 void add_products(const Observations& observations, const std::vector<int>& rows,
                   std::vector<Curve>& curves) {
@@ -180,6 +174,11 @@ double correlation(const Covariate& first, const Covariate& second) {
                         v = second.value.col(0).array() - second.value.col(0).mean();
   const double norms = u.norm() * v.norm();
   return norms > 0 ? u.dot(v) / norms : 0;
+}
+
+bool can_be_followed(const Observations& observations, const Covariate& covariate) {
+  return !observations.not_usable.contains(covariate.name) && covariate.value.allFinite() &&
+         covariate.value.maxCoeff() > covariate.value.minCoeff();
 }
 
 double share_beside_cubics(const Observations& observations, const std::vector<int>& rows,

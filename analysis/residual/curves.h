@@ -43,6 +43,9 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
 /// Over all rows, of the first channel; 0 where one of them is constant.
 double correlation(const Covariate& first, const Covariate& second);
 
+/// Numbers that differ between the runs.
+bool can_be_followed(const Observations& observations, const Covariate& covariate);
+
 /// Of a column's variance in `rows`, the share that is no cubic of these conditions, all in deviations from
 /// the groups' means; column and conditions have an entry for each of `rows`. 0 where the column does not
 /// vary.

@@ -168,6 +168,12 @@ Components difference(const Components& a, const Components& b) {
   return result;
 }
 
+Components without(Components y, const std::vector<Components>& columns, const Eigen::VectorXd& amplitude) {
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    for (std::size_t k = 0; k < y.size(); ++k) y[k] -= amplitude(static_cast<Index>(c)) * columns[c][k];
+  return y;
+}
+
 namespace {
 
 /// The part of the baseline's lines beyond its constants: of each group, its own slopes fitted to `rows`.

@@ -31,6 +31,8 @@ Eigen::MatrixXd predict_response(const Observations& observations, const MeanMod
 /// y of the observations, as components.
 Components response_components(const Observations& observations);
 Components difference(const Components& a, const Components& b);
+/// y less columns times their amplitudes.
+Components without(Components y, const std::vector<Components>& columns, const Eigen::VectorXd& amplitude);
 
 LinearModel linearise(const Observations& observations, const MeanModel& model,
                       const Eigen::MatrixXd& predicted);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "analysis/residual/attribution.h"
+#include "analysis/residual/condition_scatter.h"
 
 #include <map>
 #include <memory>
@@ -117,13 +118,10 @@ class Search {
   /// beside the model and the best curve, whose own part must not count as scatter. Then the search has begun
   /// again, with such scatter.
   bool begin_with_scatter_of(const CurveScan& curves);
-  /// What runs scatter with beside columns, and how likely both are.
   struct ScatterBeside {
     std::vector<Components> columns;
-    RunScatter::ByCondition by_condition;
-    double log_likelihood = 0;  // less ½ ln n for each column and condition
+    ScatterFit scatter;
   };
-  ScatterBeside scatter_by_condition(std::vector<Components> columns, std::mt19937_64& random) const;
   /// Beside the model and the best curve, if that has this evidence; or without the curve, where scatter is
   /// likelier.
   ScatterBeside scatter_beside(const CurveScan& curves, double least_evidence, std::mt19937_64& random) const;

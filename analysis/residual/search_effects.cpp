@@ -116,10 +116,7 @@ std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Can
                                                   const CandidateFit& found) const {
   constexpr Index kFewest = 20;
   if (mixed_->dof(0) < kFewest) return {};
-  Components residual = difference(y_, fit.linear.offset);
-  for (std::size_t c = 0; c < candidate.columns.size(); ++c)
-    for (std::size_t k = 0; k < residual.size(); ++k)
-      residual[k] -= found.amplitude(static_cast<Index>(c)) * candidate.columns[c][k];
+  const Components residual = without(difference(y_, fit.linear.offset), candidate.columns, found.amplitude);
   std::mt19937_64 random(settings_.seed * 1000003 + 6000);
   return mixed_->sizes_left(fit.variances.ratio, fit.variances.sigma, residual, candidate.columns, random);
 }

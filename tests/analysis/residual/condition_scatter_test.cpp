@@ -22,17 +22,7 @@ constexpr double kRunSigma = 0.002;
 struct ConditionScatter : testing::Test {
   std::mt19937_64 random{test::seed()};
 
-  Observations observations(double sigma = kRunSigma) {
-    Observations o = test::simulate({.runs_of_block = std::vector<int>(16, 8),
-                                     .groups = 8,
-                                     .channels = 4,
-                                     .sigma = sigma,
-                                     .session_ratio = 0.4},
-                                    random);
-    test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
-    test::add_covariate(o, "tunnel_airspeed_m_s", 0, 0.4, random);
-    return o;
-  }
+  Observations observations() { return test::four_rotors(8, kRunSigma, random); }
 
   /// Of each run, over the calmest: 1 without wind, `times` at the most of it.
   static VectorXd gusts(const Observations& o, double times) {
@@ -48,16 +38,9 @@ struct ConditionScatter : testing::Test {
     test::set_y(o, y);
   }
 
-  /// As the search does, without anything adopted.
-  RunScatter::ByCondition found(Observations o) {
-    for (int step = 0; step < 8; ++step) {
-      const MixedModel model(o, o.all_rows());
-      const NullFit variances = CandidateScan(model, {}, {}).null_fit({o.y});
-      if (!let_scatter_differ(o, run_sizes(model, variances, {o.y}, {}, random), o.value, random,
-                              o.scatter.by_condition))
-        break;
-    }
-    return o.scatter.by_condition;
+  /// Without anything adopted.
+  RunScatter::ByCondition found(const Observations& o) {
+    return condition_scatter(o, o.all_rows(), {o.y}, {}, o.value, random).by_condition;
   }
 };
 

@@ -20,14 +20,7 @@ constexpr double kRunSigma = 0.002;
 struct Scatter : testing::Test {
   std::mt19937_64 random{test::seed()};
 
-  Observations observations() {
-    Observations o = test::simulate(
-        {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .sigma = kRunSigma, .session_ratio = 0.4},
-        random);
-    test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
-    test::add_covariate(o, "tunnel_airspeed_m_s", 0, 0.4, random);
-    return o;
-  }
+  Observations observations() { return test::four_rotors(3, kRunSigma, random); }
 
   /// `times` the others' scatter from run to run.
   void let_scatter_more(Observations& o, Index rotor, double times) {

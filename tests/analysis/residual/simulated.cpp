@@ -72,6 +72,18 @@ void add_covariate(Observations& observations, const std::string& name, double l
   observations.covariates.push_back(std::move(covariate));
 }
 
+Observations four_rotors(int groups, double sigma, std::mt19937_64& random) {
+  Observations o = simulate({.runs_of_block = std::vector<int>(16, 8),
+                             .groups = groups,
+                             .channels = 4,
+                             .sigma = sigma,
+                             .session_ratio = 0.4},
+                            random);
+  add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
+  add_covariate(o, "tunnel_airspeed_m_s", 0, 0.4, random);
+  return o;
+}
+
 void add_effect(Observations& observations, const std::string& name, const std::vector<double>& parameters) {
   const Term term{.effect = &effect_named(name), .parameters = parameters};
   const TermResponse response = respond(term, observations, observations.value);

@@ -32,6 +32,9 @@ void set_y(Observations& observations, const Eigen::MatrixXd& y);
 void add_covariate(Observations& observations, const std::string& name, double low, double high,
                    std::mt19937_64& random);
 
+/// Four rotors in sixteen sessions of eight runs, with a supply voltage and a wind that do nothing.
+Observations four_rotors(int groups, double sigma, std::mt19937_64& random);
+
 /// Adds an effect with these parameters to y, on the forces that are there.
 void add_effect(Observations& observations, const std::string& name, const std::vector<double>& parameters);
 
