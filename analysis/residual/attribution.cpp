@@ -42,7 +42,12 @@ void Search::begin() {
   make_models();
   ways_ = all_ways(effects_, observations_, rows_);
   const OwnEvidence has_evidence(observations_, *baseline_);
-  std::erase_if(ways_, [&](const Term& way) { return !has_evidence(way); });
+  const auto taken_back = [&](const Term& way) {
+    return std::ranges::any_of(settings_.taken_back, [&](const Term& term) {
+      return term.effect->name == way.effect->name && term.rotor == way.rotor && term.other == way.other;
+    });
+  };
+  std::erase_if(ways_, [&](const Term& way) { return taken_back(way) || !has_evidence(way); });
   points_.clear();
   for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
   result_ = {};

@@ -20,6 +20,7 @@ struct SearchSettings {
   std::uint64_t seed = 1;
   bool empirical = false;    // curves without a name are a part of the model after
   double session_ratio = 2;  // session scatter is an unknown where σ_session/σ_run is above it beyond doubt
+  std::vector<Term> taken_back;  // found before and refuted: not tried on these rotors again
   std::function<void(const std::string&)> progress = [](const std::string&) {};
 };
 

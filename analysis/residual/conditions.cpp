@@ -82,6 +82,12 @@ void warn_of_unseen(const Observations& observations, const std::vector<const Ef
     if (covariate.derived || covariate.per_channel() || observations.not_usable.contains(covariate.name) ||
         observations.assumed.contains(covariate.name) || covariate.value.array().isNaN().any())
       continue;
+    if (const Covariate* number = number_of_texts(observations, covariate)) {
+      explanation.warnings.push_back(
+          fmt::format("{} has one {} for each of its texts: what goes with them is said of {}",
+                      covariate.name, number->name, number->name));
+      continue;
+    }
     const bool named = std::any_of(effects.begin(), effects.end(), [&](const Effect* effect) {
       const auto& names = effect->covariates;
       return std::find(names.begin(), names.end(), covariate.name) != names.end();

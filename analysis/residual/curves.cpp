@@ -176,6 +176,24 @@ double correlation(const Covariate& first, const Covariate& second) {
   return norms > 0 ? u.dot(v) / norms : 0;
 }
 
+const Covariate* number_of_texts(const Observations& observations, const Covariate& texts) {
+  if (texts.labels.empty()) return nullptr;
+  for (const Covariate& number : observations.covariates) {
+    if (!number.labels.empty() || number.derived || number.per_channel() ||
+        !can_be_followed(observations, number))
+      continue;
+    std::map<double, double> of_text, of_number;
+    bool one_to_one = true;
+    for (Index row = 0; row < observations.rows() && one_to_one; ++row) {
+      const double text = texts.value(row, 0), value = number.value(row, 0);
+      one_to_one = of_text.emplace(text, value).first->second == value &&
+                   of_number.emplace(value, text).first->second == text;
+    }
+    if (one_to_one) return &number;
+  }
+  return nullptr;
+}
+
 bool can_be_followed(const Observations& observations, const Covariate& covariate) {
   return !observations.not_usable.contains(covariate.name) && covariate.value.allFinite() &&
          covariate.value.maxCoeff() > covariate.value.minCoeff();
@@ -245,7 +263,8 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
   const std::vector<Place> places = places_to_try(observations, rows);
   std::vector<Curve> curves;
   for (const Covariate& covariate : observations.covariates) {
-    if (!can_be_followed(observations, covariate)) continue;
+    if (!can_be_followed(observations, covariate) || number_of_texts(observations, covariate) != nullptr)
+      continue;
     if (const std::vector<double> levels = levels_of(observations, covariate, rows); !levels.empty()) {
       const auto column_at = [&](int k, double x) { return level_column(levels, k, x); };
       for (const int rotor : rotors)

@@ -43,6 +43,10 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
 /// Over all rows, of the first channel; 0 where one of them is constant.
 double correlation(const Covariate& first, const Covariate& second);
 
+/// The column of numbers that has one value for each of these texts, and another for each other: what goes
+/// with the texts is told by it. Null where there is none.
+const Covariate* number_of_texts(const Observations& observations, const Covariate& texts);
+
 /// Numbers that differ between the runs.
 bool can_be_followed(const Observations& observations, const Covariate& covariate);
 

@@ -1,9 +1,7 @@
+// The protocol done again without what it showed to be wrong: gross rows, names that the seal refutes.
 #include "analysis/residual/explanation_parts.h"
-#include "datasets/error.h"
 
 #include <algorithm>
-#include <cmath>
-#include <iterator>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -11,248 +9,9 @@
 namespace tunnelrig {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-
-constexpr int kFewestBlocks = 6;
 constexpr std::size_t kRowsPerGross = 10;  // at most one row of ten is set aside
 constexpr std::size_t kRunsPerGross = 25;  // what touches more runs of a campaign is no slip of the hand
 constexpr int kMostSearches = 2;           // after the first, each without the gross rows of the one before
-
-/// Errors of the fitted runs themselves, n × c in the unit.
-MatrixXd residuals(const Observations& observations, const JointFit& fit, const std::vector<int>& rows) {
-  const Components y = difference(response_components(observations), fit.linear.offset);
-  return predict_held_out(observations, y, fit.linear.columns, fit.variances, rows, rows).error;
-}
-
-/// Response per unit of y.
-double scale_of(const Observations& observations) {
-  return observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
-}
-
-double rms(const MatrixXd& errors) {
-  const auto missing = errors.array().isNaN();
-  const Index count = errors.size() - missing.count();
-  return count == 0 ? 0 : std::sqrt(missing.select(0, errors).squaredNorm() / static_cast<double>(count));
-}
-
-HeldOutErrors score(const Observations& observations, const JointFit& fit, const NullFit& variances,
-                    const std::vector<int>& fit_rows, const std::vector<int>& test_rows) {
-  const Components y = difference(response_components(observations), fit.linear.offset);
-  return predict_held_out(observations, y, fit.linear.columns, variances, fit_rows, test_rows);
-}
-
-/// The named terms as they were found beside the curves: fitted without them, they would take up what the
-/// curves describe.
-JointFit without_curves(const Attribution& found, const std::vector<int>& rows) {
-  JointFit fit = found.final;
-  fit.model.curves.clear();
-  const Observations& observations = found.observations;
-  fit.linear = linearise(observations, fit.model, predict_response(observations, fit.model, rows));
-  fit.linear.columns.clear();
-  fit.variances = CandidateScan(MixedModel(observations, rows), {}, {})
-                      .null_fit(difference(response_components(observations), fit.linear.offset));
-  return fit;
-}
-
-std::string verdict_of(const Explanation& explanation) {
-  if (explanation.adopted.empty()) return explanation.unknown.empty() ? "no_structure" : "unknown";
-  if (!explanation.unknown.empty()) return "partly_explained";
-  const bool confounded = std::any_of(explanation.adopted.begin(), explanation.adopted.end(),
-                                      [](const AdoptedEffect& a) { return !a.confounded_with.empty(); });
-  return confounded ? "confounded" : "explained";
-}
-
-/// Too few blocks to find out anything: errors of the baseline, by leaving blocks out where there are two.
-void explain_too_few(const Observations& observations, const SearchSettings& settings,
-                     Explanation& explanation) {
-  const std::vector<int> rows = observations.all_rows();
-  const JointFit fit = fit_jointly(observations, {}, rows);
-  explanation.residual_before = explanation.residual_after = residuals(observations, fit, rows);
-  explanation.before.rmse = rms(explanation.residual_before);
-  explanation.before.held_out_rmse = explanation.before.held_out_low = explanation.before.held_out_high =
-      explanation.before.rmse;
-  explanation.noise_floor = explanation.before.rmse;
-  if (observations.blocks() > 1) {
-    const CrossValidation validation =
-        cross_validate(observations, response_components(observations), {}, fit.variances, rows);
-    if (const double rmse = validation.rmse(); !std::isnan(rmse))
-      explanation.before.held_out_rmse = explanation.before.held_out_low = explanation.before.held_out_high =
-          rmse;
-  }
-  explanation.after = explanation.before;
-  explanation.detectable =
-      scale_of(observations) *
-      detectable_by_one(MixedModel(observations, rows, fit.variances.ratio), fit.variances, settings.alpha);
-  explanation.verdict = "insufficient";
-  explanation.warnings.push_back(
-      fmt::format("{} blocks are too few to tell an effect from chance; {} are needed", observations.blocks(),
-                  kFewestBlocks));
-}
-
-void report_adopted(const Observations& observations, const Attribution& found, const JointFit& whole,
-                    const std::vector<int>& rows, Explanation& explanation) {
-  const auto parameters = estimate_parameters(observations, whole, rows);
-  for (std::size_t t = 0; t < found.accepted.size(); ++t) {
-    const Accepted& accepted = found.accepted[t];
-    AdoptedEffect adopted{whole.model.terms[t], parameters[t], accepted.p, accepted.gain, {}, {}};
-    if (adopted.term.per_group)
-      adopted.parameters[0] = summary_of_groups(adopted.term.effect->parameters[0],
-                                                estimate_by_group(observations, whole.model, t, rows));
-    for (std::size_t k = 0; k < adopted.parameters.size(); ++k)
-      adopted.parameters[k].unit = unit_of(observations, adopted.term.effect->parameters[k]);
-    for (const Ranked& rival : accepted.confounded)
-      adopted.confounded_with.push_back(rival.term.effect->name);
-    if (!accepted.confounded.empty())
-      adopted.separating_run =
-          separating_run(observations, accepted.term, accepted.confounded[0].term, found.final, rows);
-    explanation.adopted.push_back(std::move(adopted));
-  }
-}
-
-/// What the opened seal and the intervals say against what was adopted.
-void warn_of_doubts(Explanation& explanation) {
-  constexpr double kFarAboveFloor = 1.25;
-  for (const AdoptedEffect& adopted : explanation.adopted) {
-    const ParameterEstimate& amplitude = adopted.parameters[0];
-    for (const ParameterEstimate& parameter : adopted.parameters)
-      if (parameter.theory && (parameter.value < parameter.low || parameter.value > parameter.high))
-        explanation.warnings.push_back(fmt::format(
-            "{}: its {} is theory's {:.4g}, and the data alone say {:.4g} to {:.4g}: something else goes "
-            "with it",
-            adopted.term.label(), parameter.name, parameter.value, parameter.low, parameter.high));
-    const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
-    // Where groups have their own, these may be of either sign, and nothing on the whole.
-    if (adopted.term.per_group ? std::ranges::all_of(amplitude.groups, holds_0) : holds_0(amplitude))
-      explanation.warnings.emplace_back(fmt::format("{}: the 95 % interval of its {} holds 0: doubt it",
-                                                    adopted.term.label(), amplitude.name));
-  }
-  if (!explanation.adopted.empty() && explanation.after.held_out_rmse > explanation.before.held_out_rmse)
-    explanation.warnings.emplace_back(
-        "on the sealed blocks the error is larger with what was adopted than without: doubt it");
-  else if (explanation.after.held_out_low > kFarAboveFloor * explanation.noise_floor &&
-           explanation.noise_floor > 0)
-    explanation.warnings.push_back(
-        fmt::format("on the sealed blocks the error after is {:.2g} times the noise floor: something varies "
-                    "there that the model does not have",
-                    explanation.after.held_out_rmse / explanation.noise_floor));
-}
-
-std::string only_sealed_in_words(const std::vector<std::string>& groups) {
-  constexpr std::size_t kNamed = 5;
-  const auto end = groups.begin() + static_cast<std::ptrdiff_t>(std::min(groups.size(), kNamed));
-  return fmt::format("runs in sealed blocks only, so not scored: {}{}", fmt::join(groups.begin(), end, ", "),
-                     groups.size() > kNamed ? fmt::format(" and {} more", groups.size() - kNamed) : "");
-}
-
-/// The protocol, once, on all rows.
-Explanation explain_all(const Observations& observations, const std::vector<const Effect*>& effects,
-                        const SearchSettings& settings) {
-  Explanation explanation{.campaign = observations.campaign,
-                          .response = observations.response,
-                          .unit = observations.unit,
-                          .baseline = observations.baseline,
-                          .verdict = {},
-                          .blocks = observations.blocks(),
-                          .runs = static_cast<int>(observations.rows()),
-                          .model = {}};
-  explanation.warnings = observations.left_out;
-  for (const auto& [covariate, why] : observations.not_usable)
-    explanation.warnings.push_back(
-        fmt::format("{} is {}{}", covariate, why,
-                    why.starts_with("missing") ? ": what goes with it cannot be seen" : ""));
-  const std::vector<int> rows = observations.all_rows();
-  if (observations.blocks() < kFewestBlocks) {
-    report_untestable(observations, effects, rows, explanation);
-    explain_too_few(observations, settings, explanation);
-    return explanation;
-  }
-
-  const Seal seal = seal_blocks(observations, settings.seed);
-  const bool own_baselines = observations.groups_within_blocks || !observations.held_out.empty();
-  if (!seal.only_sealed.empty() && !own_baselines)
-    explanation.warnings.push_back(only_sealed_in_words(seal.only_sealed));
-  const Attribution found = attribute(observations, seal.open, effects, settings);
-  const Observations& wide = found.observations;
-  // What the baseline is held against: the same, without what groups have of their own.
-  Observations alone = observations;
-  alone.scatter = wide.scatter;
-  report_untestable(alone, effects, rows, explanation);
-  warn_of_scatter(wide, explanation);
-  if (static_cast<int>(found.accepted.size()) >= settings.most_effects)
-    explanation.warnings.push_back(
-        fmt::format("the search ended with {} effects, as many as --max-effects allows: where there are "
-                    "more, these may be wrong; try more",
-                    found.accepted.size()));
-  explanation.rounds = found.rounds;
-  explanation.curve_rounds = found.curve_rounds;
-  explanation.detectable = found.detectable_sigma * scale_of(observations);
-  for (const auto& [name, sigma] : found.detectable_by_effect)
-    explanation.detectable_by_effect[name] = sigma * scale_of(observations);
-
-  // The seal is opened: nothing that was decided above changes any more. Curves have no name, so they are not
-  // part of "after" unless they are asked for.
-  JointFit named = found.final;
-  if (settings.empirical)
-    for (const FoundCurve& found_curve : found.curves)
-      explanation.empirical.push_back(found_curve.curve.label());
-  if (!found.curves.empty() && !settings.empirical)
-    named = found.accepted.empty() ? found.baseline : without_curves(found, seal.open);
-  const std::vector<int> astride = astride_of_steps(named.model, seal);
-  std::vector<int> scored;
-  std::set_difference(seal.sealed.begin(), seal.sealed.end(), astride.begin(), astride.end(),
-                      std::back_inserter(scored));
-  if (!astride.empty())
-    explanation.warnings.push_back(fmt::format(
-        "{} of the {} sealed runs lie where a step may be as well, so they are not scored: {} to {}",
-        astride.size(), seal.sealed.size(), observations.name[static_cast<std::size_t>(astride.front())],
-        observations.name[static_cast<std::size_t>(astride.back())]));
-  const HeldOutErrors before = score(alone, found.baseline, named.variances, seal.open, scored);
-  const HeldOutErrors after = score(wide, named, named.variances, seal.open, scored);
-  if (before.count() == 0)
-    throw InputError(
-        "no row that is held out can be scored: each stands alone in a group that has no other rows; "
-        "hold out others");
-  set_interval(observations, before, settings.seed, explanation.before);
-  set_interval(observations, after, settings.seed, explanation.after);
-  explanation.noise_floor =
-      rms(score(wide, found.final, found.final.variances, seal.open, scored).expected_std);
-  explanation.before.rmse = rms(residuals(alone, found.baseline, seal.open));
-  explanation.after.rmse = rms(residuals(wide, named, seal.open));
-
-  settings.progress("estimating parameters");
-  std::vector<ChangePoint> change_points;
-  const JointFit whole =
-      fit_jointly(wide, with_change_points_of_all(wide, found.final.model, seal.open, change_points), rows);
-  const JointFit whole_baseline = fit_jointly(alone, {}, rows);
-  for (const Accepted& accepted : found.accepted)
-    if (at_bound(whole, accepted.term))
-      explanation.warnings.push_back(fmt::format(
-          "with the sealed blocks in, {} goes to its physical bound: doubt it", accepted.term.label()));
-  explanation.model = whole.model;
-  explanation.residual_before = residuals(alone, whole_baseline, rows);
-  const HeldOutErrors fitted = score(wide, whole, whole.variances, rows, rows);
-  explanation.residual_after = fitted.error;
-  report_adopted(wide, found, whole, rows, explanation);
-  for (const ChangePoint& point : change_points) {
-    ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
-    estimate.low = point.low;
-    estimate.high = point.high;
-    estimate.run = observations.name[static_cast<std::size_t>(estimate.value)];
-  }
-  warn_of_doubts(explanation);
-  warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);
-  for (const FoundCurve& curve : found.curves)
-    explanation.unknown.push_back(describe(wide, whole, curve, rows));
-  if (found.session_unknown && found.curves.empty())
-    explanation.unknown.push_back(describe_sessions(observations, fitted.error, rows));
-  explanation.suspect_rows =
-      suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
-  warn_of_alike_rows(observations, explanation);
-  warn_of_changes_at_steps(observations, explanation);
-  explanation.verdict = verdict_of(explanation);
-  return explanation;
-}
 
 std::vector<int> rows_but(const Observations& observations, const std::vector<SuspectRow>& left_out) {
   std::vector<int> rows;
@@ -296,7 +55,7 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
   const bool aside_too = misled && rows.size() <= aside.room();
   if (aside_too) {
     aside.take(rows);
-    explanation = explain_all(aside.kept, effects, settings);
+    explanation = explain_once(aside.kept, effects, settings);
   }
   for (const IsolatedValue& value : isolated)
     explanation.warnings.push_back(
@@ -304,6 +63,63 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
                     value.row, value.value, value.low, value.high,
                     aside_too ? "set aside, since the model found with it predicted worse than none"
                               : "a typing error?"));
+  return explanation;
+}
+
+/// What all runs say against a name that the open ones had let in; empty: nothing. Theory's coefficient is
+/// not the data's to refute.
+std::string refutation(const AdoptedEffect& adopted) {
+  if (adopted.term.effect->theory_only || adopted.term.at_theory) return "";
+  const ParameterEstimate& amplitude = adopted.parameters[0];
+  if (adopted.at_bound) return fmt::format("its {} is at its physical bound", amplitude.name);
+  const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
+  // Where groups have their own, these may be of either sign, and nothing on the whole.
+  const bool nothing =
+      adopted.term.per_group ? std::ranges::all_of(amplitude.groups, holds_0) : holds_0(amplitude);
+  return nothing ? fmt::format("the 95 % interval of its {} holds 0", amplitude.name) : "";
+}
+
+/// What the opened seal refutes: single names, or all of them, since which is wrong is not known, and another
+/// for the same would be chosen by the seal.
+struct Refuted {
+  std::vector<Term> terms;
+  bool all = false;
+  std::vector<std::string> said;
+};
+
+Refuted refuted(const Explanation& explanation) {
+  constexpr double kWorse = 1.1;
+  Refuted result;
+  std::vector<std::string> names;
+  for (const AdoptedEffect& adopted : explanation.adopted) {
+    if (!adopted.term.effect->theory_only) names.push_back(adopted.term.label());
+    const std::string why = refutation(adopted);
+    if (why.empty()) continue;
+    result.terms.push_back(adopted.term);
+    result.said.push_back(fmt::format("{} was found and is taken back: with the sealed blocks in, {}",
+                                      adopted.term.label(), why));
+  }
+  result.all = result.terms.empty() && !names.empty() &&
+               explanation.named_held_out_rmse > kWorse * explanation.before.held_out_rmse;
+  if (result.all)
+    result.said.push_back(fmt::format(
+        "{} found and taken back: the error of the sealed blocks is {:.4g} {} with {}, {:.4g} without",
+        fmt::join(names, ", "), explanation.named_held_out_rmse, explanation.unit,
+        names.size() > 1 ? "them" : "it", explanation.before.held_out_rmse));
+  return result;
+}
+
+/// Once more without the names that are refuted: what they did may be structure whose cause is not known.
+Explanation without_refuted(Explanation explanation, const Observations& observations,
+                            std::vector<const Effect*> effects, SearchSettings settings) {
+  std::vector<std::string> said;
+  for (Refuted found = refuted(explanation); !found.said.empty(); found = refuted(explanation)) {
+    said.insert(said.end(), found.said.begin(), found.said.end());
+    settings.taken_back.insert(settings.taken_back.end(), found.terms.begin(), found.terms.end());
+    if (found.all) std::erase_if(effects, [](const Effect* effect) { return !effect->theory_only; });
+    explanation = explain_once(observations, effects, settings);
+  }
+  explanation.warnings.insert(explanation.warnings.end(), said.begin(), said.end());
   return explanation;
 }
 
@@ -326,15 +142,16 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
   }
   if (!observations.from_table)
     if (const auto wild = wild_runs(aside.kept); wild.size() <= aside.room()) aside.take(wild);
-  Explanation explanation = explain_all(aside.kept, effects, settings);
+  Explanation explanation = explain_once(aside.kept, effects, settings);
   for (int again = 0; again < kMostSearches; ++again) {
     const std::vector<SuspectRow> gross = gross_rows(aside.kept, explanation.suspect_rows);
     if (gross.empty() || gross.size() > aside.room()) break;  // many are no typing errors: the model is wrong
     aside.take(gross);
-    explanation = explain_all(aside.kept, effects, settings);
+    explanation = explain_once(aside.kept, effects, settings);
   }
   if (observations.from_table)
     explanation = without_isolated(std::move(explanation), aside, effects, settings);
+  explanation = without_refuted(std::move(explanation), aside.kept, effects, settings);
   explanation.suspect_rows.insert(explanation.suspect_rows.begin(), aside.rows.begin(), aside.rows.end());
   return explanation;
 }

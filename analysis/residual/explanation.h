@@ -40,6 +40,7 @@ struct AdoptedEffect {
   std::vector<ParameterEstimate> parameters;
   double p_value = 1;
   double held_out_gain = 0;  // unit of the response
+  bool at_bound = false;     // of the amplitude, with the sealed runs in
   std::vector<std::string> confounded_with;
   std::optional<SeparatingRun> separating_run;
 };
@@ -80,6 +81,7 @@ struct Explanation {
   double noise_floor = 0;
   int blocks = 0, runs = 0;
   ErrorEstimate before, after;
+  double named_held_out_rmse = 0;  // of what has a name; `after` may have curves in it
   std::vector<AdoptedEffect> adopted;
   std::vector<UnknownStructure> unknown;
   std::vector<Untestable> untestable;

@@ -6,6 +6,12 @@
 
 namespace tunnelrig {
 
+// --- protocol.cpp
+
+/// The protocol, once, on all rows.
+Explanation explain_once(const Observations& observations, const std::vector<const Effect*>& effects,
+                         const SearchSettings& settings);
+
 // --- conditions.cpp
 
 /// Effects that cannot be tried and why; conditions that nothing can be found to follow, because they never

@@ -88,6 +88,23 @@ struct CandidateScan::Impl {
         of_stratum.push_back(items[i]);
       }
     stacked.push_back(model.stack(s, of_stratum));
+    if (model.strata()[s].means()) leave_out_what_the_baseline_has(s);
+  }
+
+  /// What is left of such a column is rounding, and its amplitude would be anything.
+  void leave_out_what_the_baseline_has(std::size_t s) {
+    constexpr double kNothing = 1e-14;  // of its squares
+    Stacked left = stacked[s];
+    model.project(s, 0, left);
+    std::vector<Index> kept, columns;
+    for (Index c = 0; c < left.cols(); ++c)
+      if (left.col(c).squaredNorm() > kNothing * stacked[s].col(c).squaredNorm()) {
+        kept.push_back(used[s][static_cast<std::size_t>(c)]);
+        columns.push_back(c);
+      }
+    if (kept.size() == used[s].size()) return;
+    used[s] = std::move(kept);
+    stacked[s] = Stacked(stacked[s](Eigen::all, columns));
   }
 
   Products multiply(std::size_t s, std::size_t ratio, Stacked projected) const {

@@ -56,6 +56,10 @@ class Search {
   std::vector<Ranked> ranking(const Scan& scan, NullMaxima& maxima) const;
   /// The best candidate whose parameters stay within physics and which predicts blocks that it has not seen.
   bool accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round);
+  /// The rule that keeps a fit's last term out, in words; nothing where none does. `after`: its leave-one-
+  /// block-out losses; `gain`: theirs on those without the term.
+  std::optional<std::string> why_not(const JointFit& fit, const CrossValidation& after,
+                                     const LossDifference& gain) const;
   /// The covariate that an effect shares with an accepted one, if a bend over it predicts unseen blocks about
   /// as well: what two names over one covariate do together, a curve does too, and their sum is no evidence
   /// of a second cause.
@@ -79,9 +83,11 @@ class Search {
   bool another_does_as_well(const CrossValidation& own, const NullFit& variances) const;
   /// Whether it is one of the measured speed, of which the model does not have the square.
   bool lacks_speed_squared(const Term& term) const;
-  /// The effect of the same condition and rotors that the model's newest term takes back: both are several
-  /// times what they make together, which is a shape and no two causes.
-  std::optional<std::string> cancelled_by(const MeanModel& model) const;
+  /// Both are several times what they make together.
+  bool cancel(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) const;
+  /// The effect of the same condition and rotors that the fit's newest term takes back, or curves that do:
+  /// such a sum is a shape and no two causes.
+  std::optional<std::string> cancelled_by(const JointFit& fit) const;
   /// Of a term that is a step, counted from the newest (1): from the run on, of the sessions on either side,
   /// where it is likeliest.
   JointFit at_best_run(JointFit fit, std::size_t from_newest) const;
@@ -140,6 +146,11 @@ class Search {
   /// Whether the newest curve, over a covariate of this effect, has more of the effect's size than its
   /// formula may leave: then the effect was only the curve's straight part.
   bool outshone_by_curve(const Term& term) const;
+  /// Whether the curves, whatever they are over, undo most of what an effect does: beside each other both can
+  /// have any size.
+  bool is_taken_back_by_curves(const Term& term, const JointFit& fit) const;
+  /// By those of a fit from the first that is named on.
+  Eigen::MatrixXd made_by_curves(const JointFit& fit, std::size_t first) const;
   void add_curve(const Curve& curve, double p);
   /// Whether a curve over the same covariate and rotor is in.
   bool is_described(const Curve& curve) const;

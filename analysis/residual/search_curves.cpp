@@ -125,7 +125,9 @@ void Search::drop_what_a_curve_replaces() {
     const JointFit without = fit_without(t);
     // What two conditions do together is not what one of them does.
     const bool product = result_.curves.back().curve.strength.has_value();
-    if (!outshone && !at_bound(fit_, term) && (product || is_still_found(term, without))) continue;
+    if (!outshone && !at_bound(fit_, term) && !is_taken_back_by_curves(term, fit_) &&
+        (product || is_still_found(term, without)))
+      continue;
     if (outshone)
       give_way_to_curve(t, without);
     else
@@ -192,16 +194,28 @@ bool Search::is_work_of_a_curve(const Term& term) const {
 bool Search::outshone_by_curve(const Term& term) const {
   const Curve& curve = result_.curves.back().curve;
   if (curve.tilt.empty() || !is_over(curve, conditions_of(*term.effect))) return false;
-  const AmplitudeFit fit = fit_amplitudes(observations_, difference(y_, fit_.linear.offset),
-                                          fit_.linear.columns, fit_.variances, rows_);
-  const auto columns = static_cast<Eigen::Index>(curve.columns.size());
-  const Eigen::VectorXd amplitude = fit.amplitude.tail(columns);
-  Eigen::MatrixXd drawn = Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels());
-  for (Eigen::Index k = 0; k < columns; ++k)
-    drawn += amplitude(k) * curve.columns[static_cast<std::size_t>(k)][0];
+  const Eigen::MatrixXd drawn = made_by_curves(fit_, fit_.model.curves.size() - 1);
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
   const double most = term.effect->parameters.size() > 1 ? kMostLeft_bending : kMostLeft;
   return rms_of(drawn) > most * rms_of(respond(term, observations_, predicted).value[0]);
+}
+
+Eigen::MatrixXd Search::made_by_curves(const JointFit& fit, std::size_t first) const {
+  const Eigen::VectorXd amplitude = fit_amplitudes(observations_, difference(y_, fit.linear.offset),
+                                                   fit.linear.columns, fit.variances, rows_)
+                                        .amplitude;
+  Eigen::MatrixXd made = Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels());
+  std::size_t column = fit.linear.columns.size();  // the curves' are the last
+  for (std::size_t c = fit.model.curves.size(); c-- > first;)
+    for (std::size_t k = fit.model.curves[c].columns.size(); k-- > 0;)
+      made += amplitude(static_cast<Eigen::Index>(--column)) * fit.model.curves[c].columns[k][0];
+  return made;
+}
+
+bool Search::is_taken_back_by_curves(const Term& term, const JointFit& fit) const {
+  if (fit.model.curves.empty()) return false;
+  const Eigen::MatrixXd predicted = predict_response(observations_, fit.model, rows_);
+  return cancel(respond(term, observations_, predicted).value[0], made_by_curves(fit, 0));
 }
 
 bool Search::session_scatter_is_large() const {

@@ -139,8 +139,11 @@ std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const 
 
 bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round) {
   std::vector<const Effect*> refused;
-  const CrossValidation before = cross_validate(observations_, difference(y_, fit_.linear.offset),
-                                                fit_.linear.columns, fit_.variances, rows_);
+  const auto unseen = [this](const JointFit& fit, const NullFit& variances) {
+    return cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns, variances,
+                          rows_);
+  };
+  const CrossValidation before = unseen(fit_, fit_.variances);
   for (const std::size_t best : scan.order) {
     if (scan.fits[best].evidence < critical_) break;
     if (scan.partner.contains(best)) {
@@ -164,44 +167,14 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
       continue;
     }
     JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
-    const Term& term = fit.model.terms.back();
-    // Its own amplitude, and those of the effects before it, which it may push out.
-    const auto outside = std::find_if(fit.model.terms.rbegin(), fit.model.terms.rend(),
-                                      [&](const Term& each) { return at_bound(fit, each); });
-    if (outside != fit.model.terms.rend()) {
-      round.outcome +=
-          outside->same_way(term)
-              ? fmt::format("{} would leave its physical bounds; ", term.label())
-              : fmt::format("with {}, {} would leave its physical bounds; ", term.label(), outside->label());
-      continue;
-    }
-    const CrossValidation after = cross_validate(observations_, difference(y_, fit.linear.offset),
-                                                 fit.linear.columns, fit.variances, rows_);
+    const CrossValidation after = unseen(fit, fit.variances);
     // Both are scored by the variances of the larger model, so that the difference is the mean's.
-    const CrossValidation base = cross_validate(observations_, difference(y_, fit_.linear.offset),
-                                                fit_.linear.columns, fit.variances, rows_);
-    const LossDifference gain = compare(base, after);
-    if (!(gain.mean > gain.standard_error)) {
-      round.outcome += fmt::format("{} does not predict unseen blocks; ", term.label());
+    const LossDifference gain = compare(unseen(fit_, fit.variances), after);
+    if (const auto reason = why_not(fit, after, gain)) {
+      round.outcome += *reason + "; ";
       continue;
     }
-    if (lacks_speed_squared(term)) {
-      round.outcome += fmt::format("{} without rotor_speed is no way of the speed; ", term.label());
-      continue;
-    }
-    if (const auto other = cancelled_by(fit.model)) {
-      round.outcome += fmt::format("{} and {} would cancel each other; ", term.label(), *other);
-      continue;
-    }
-    if (const auto shared = only_bends(term, fit.variances, after)) {
-      round.outcome += fmt::format("{} is no more than a bend over {}; ", term.label(), *shared);
-      continue;
-    }
-    if (term.effect->has_change_point() && is_gradual({term}, fit.variances, after)) {
-      round.outcome += fmt::format("{} is no better than a gradual change; ", term.label());
-      continue;
-    }
-    result_.accepted.push_back({.term = term,
+    result_.accepted.push_back({.term = fit.model.terms.back(),
                                 .p = maxima.p(scan.fits[i].evidence),
                                 .gain = before.rmse() - after.rmse(),
                                 .confounded = {}});
@@ -212,6 +185,29 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
     return true;
   }
   return false;
+}
+
+std::optional<std::string> Search::why_not(const JointFit& fit, const CrossValidation& after,
+                                           const LossDifference& gain) const {
+  const Term& term = fit.model.terms.back();
+  // Its own amplitude, and those of the effects before it, which it may push out.
+  for (auto each = fit.model.terms.rbegin(); each != fit.model.terms.rend(); ++each) {
+    if (!at_bound(fit, *each)) continue;
+    return each->same_way(term)
+               ? fmt::format("{} would leave its physical bounds", term.label())
+               : fmt::format("with {}, {} would leave its physical bounds", term.label(), each->label());
+  }
+  if (!(gain.mean > gain.standard_error))
+    return fmt::format("{} does not predict unseen blocks", term.label());
+  if (lacks_speed_squared(term))
+    return fmt::format("{} without rotor_speed is no way of the speed", term.label());
+  if (const auto other = cancelled_by(fit))
+    return fmt::format("{} and {} would cancel each other", term.label(), *other);
+  if (const auto shared = only_bends(term, fit.variances, after))
+    return fmt::format("{} is no more than a bend over {}", term.label(), *shared);
+  if (term.effect->has_change_point() && is_gradual({term}, fit.variances, after))
+    return fmt::format("{} is no better than a gradual change", term.label());
+  return std::nullopt;
 }
 
 JointFit Search::fit_with(Term term, double amplitude) const {

@@ -18,10 +18,16 @@ bool Search::lacks_speed_squared(const Term& term) const {
                       [](const Accepted& accepted) { return accepted.term.effect->name == "rotor_speed"; });
 }
 
-std::optional<std::string> Search::cancelled_by(const MeanModel& model) const {
+bool Search::cancel(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) const {
   constexpr double kMost = 2;
+  return std::min(rms_of(one), rms_of(other)) > kMost * rms_of(one + other);
+}
+
+std::optional<std::string> Search::cancelled_by(const JointFit& fit) const {
+  const MeanModel& model = fit.model;
   const Term& newest = model.terms.back();
   if (newest.per_group) return {};
+  if (is_taken_back_by_curves(newest, fit)) return "the curves";
   const Eigen::MatrixXd predicted = predict_response(observations_, model, rows_);
   const auto made_by = [&](const Term& term) { return respond(term, observations_, predicted).value[0]; };
   const auto names = conditions_of(*newest.effect);
@@ -31,8 +37,7 @@ std::optional<std::string> Search::cancelled_by(const MeanModel& model) const {
       return std::find(theirs.begin(), theirs.end(), name) != theirs.end();
     });
     if (!shared || other->per_group || other->rotor != newest.rotor) continue;
-    const Eigen::MatrixXd one = made_by(newest), two = made_by(*other);
-    if (std::min(rms_of(one), rms_of(two)) > kMost * rms_of(one + two)) return other->label();
+    if (cancel(made_by(newest), made_by(*other))) return other->label();
   }
   return {};
 }

@@ -158,8 +158,19 @@ class Evaluation {
   bool within_ = false;
 };
 
+/// Whether a group has rows before this one and from it on: a step between groups is their difference.
+bool is_within_a_group(const Observations& observations, const std::vector<int>& rows, double first) {
+  std::set<int> before;
+  return std::any_of(rows.begin(), rows.end(), [&](int row) {
+    const int group = observations.group[static_cast<std::size_t>(row)];
+    if (row >= first) return before.contains(group);
+    before.insert(group);
+    return false;
+  });
+}
+
 /// Run numbers at which a change-point leaves enough blocks of `rows` on both sides: the first run of each
-/// block.
+/// block, where a group goes on.
 std::vector<double> change_points(const Observations& observations, const std::vector<int>& rows) {
   std::vector<int> blocks;
   std::vector<double> first;
@@ -171,7 +182,10 @@ std::vector<double> change_points(const Observations& observations, const std::v
     }
   }
   if (blocks.size() < 2 * kLeastBlocksBesideAStep) return {};
-  return {first.begin() + kLeastBlocksBesideAStep, first.end() - kLeastBlocksBesideAStep + 1};
+  std::vector<double> points{first.begin() + kLeastBlocksBesideAStep,
+                             first.end() - kLeastBlocksBesideAStep + 1};
+  std::erase_if(points, [&](double point) { return !is_within_a_group(observations, rows, point); });
+  return points;
 }
 
 /// Whether the forces that the baseline predicts differ by clearly more than its constants scatter. What
