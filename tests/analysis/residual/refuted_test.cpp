@@ -1,0 +1,110 @@
+// Names that do not stand: the seal refutes them, curves undo them, or they say what another column says.
+#include "analysis/residual/curves.h"
+#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/tables.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gmock/gmock.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::MatrixXd;
+using test::effect_named;
+using test::explained;
+using test::TablesTest;
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+
+struct Refuted : TablesTest {
+  /// C_T over speed, 0.3 % of scatter, the upper third held out: a power law up to there, and behind it the
+  /// same or back down.
+  Observations coefficients(double back) {
+    std::string csv = "b,N,y\n";
+    for (int r = 0; r < 120; ++r) {
+      const double along = even(random) * 1.5, rpm = 2000 + 4000 * along;
+      const double c_t = 0.1 * std::pow(std::min(rpm, 6000.0) / 4000, 0.2) *
+                         std::pow(std::max(rpm, 6000.0) / 6000, 0.2 - back);
+      csv += fmt::format("{},{},{}\n", r / 10, rpm, c_t * (1 + 0.003 * scatter(random)));
+    }
+    return observed(csv,
+                    "blocks = \"b\"\nhold_out = \"N > 6000\"\n[response]\ncolumn = \"y\"\nunit = \"1\"\n"
+                    "meaning = \"c_t_propeller\"\n[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n"
+                    "[propeller]\ndiameter_m = 0.25\n");
+  }
+};
+
+TEST_F(Refuted, ANameThatPredictsTheHeldOutRowsStays) {
+  const Explanation e = explained(coefficients(0));
+  ASSERT_EQ(e.adopted.size(), 1u) << explanation_text(e);
+  EXPECT_LT(e.after.held_out_rmse, 0.3 * e.before.held_out_rmse);
+}
+
+TEST_F(Refuted, ANameThatPredictsThemWorseThanNoneIsTakenBack) {
+  const Explanation e = explained(coefficients(1.2));
+  EXPECT_TRUE(e.adopted.empty()) << explanation_text(e);
+  EXPECT_EQ(e.verdict, "unknown");
+  EXPECT_EQ(e.after.held_out_rmse, e.before.held_out_rmse);
+  EXPECT_THAT(e.warnings, Contains(AllOf(HasSubstr("taken back"), HasSubstr("sealed blocks"))));
+  ASSERT_FALSE(e.unknown.empty());
+  EXPECT_EQ(e.unknown[0].covariate, "speed_rpm");
+}
+
+/// A battery's name beside its voltage says nothing more.
+TEST_F(Refuted, TextsThatStandForNumbersDoNotTakeTheirName) {
+  const std::vector<double> volts = {10, 11.2, 12.1, 13.4, 14.8};
+  std::string csv = "b,V,pack,y\n";
+  for (int r = 0; r < 120; ++r) {
+    const double v = volts[static_cast<std::size_t>(r) % volts.size()];
+    csv += fmt::format("{},{},pack{},{}\n", r / 10, v, v,
+                       8 * std::pow(v / 12, 1.5) * (1 + 0.003 * scatter(random)));
+  }
+  const Observations o =
+      observed(csv,
+               "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+               "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n"
+               "[[covariates]]\ncolumn = \"pack\"\nunit = \"text\"\n");
+  const Explanation e = explained(o);
+  EXPECT_EQ(names(e), "supply_voltage ") << explanation_text(e);
+  EXPECT_THAT(e.warnings, Contains(HasSubstr("pack has one supply_voltage_V for each of its texts")));
+  for (const Curve& curve : curves_to_try(o, o.all_rows())) EXPECT_NE(curve.covariate, "pack");
+}
+
+TEST_F(Refuted, AStepIsTriedOnlyWhereAGroupGoesOnAcrossIt) {
+  std::string csv = "g,b,run_order,y\n";
+  for (int r = 0; r < 96; ++r)
+    csv += fmt::format("{},{},{},{}\n", r < 48 ? "first" : "second", r / 6, r, 5 + 0.1 * scatter(random));
+  const Observations o =
+      observed(csv,
+               "groups = [\"g\"]\nblocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+               "[[covariates]]\ncolumn = \"run_order\"\nunit = \"1\"\n");
+  std::vector<double> points;
+  for (const Term& way : ways_to_try(effect_named("propeller_step"), o, o.all_rows()))
+    for (std::size_t k = 0; k < way.parameters.size(); ++k)
+      if (way.effect->parameters[k].role == ParameterRole::kChangePoint) points.push_back(way.parameters[k]);
+  EXPECT_THAT(points, Contains(42));
+  EXPECT_THAT(points, Contains(54));
+  EXPECT_THAT(points, testing::Not(Contains(48)));
+}
+
+/// What is left of a column that the baseline has is rounding: as an adopted one it took any amplitude, and
+/// with it all of the scatter.
+TEST_F(Refuted, AColumnThatTheBaselineHasChangesNoVariance) {
+  Observations o = test::simulate({.groups = 1, .sigma = 0.01}, random);
+  o.slopes = MatrixXd::Random(o.rows(), 1);
+  const std::vector<int> rows = o.all_rows();
+  const MixedModel model(o, rows);
+  const Components y = {o.y};
+  const Components other = {MatrixXd::Random(o.rows(), 1)};
+  const Components has = {3.7 * o.slopes + MatrixXd::Constant(o.rows(), 1, 0.31)};
+  const NullFit without = CandidateScan(model, {other}, {}).null_fit(y);
+  const NullFit with = CandidateScan(model, {other, has}, {}).null_fit(y);
+  EXPECT_DOUBLE_EQ(with.sigma[0], without.sigma[0]);
+  EXPECT_DOUBLE_EQ(with.log_likelihood, without.log_likelihood);
+}
+
+}  // namespace
+}  // namespace tunnelrig
