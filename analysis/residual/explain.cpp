@@ -79,45 +79,63 @@ std::string refutation(const AdoptedEffect& adopted) {
   return nothing ? fmt::format("the 95 % interval of its {} holds 0", amplitude.name) : "";
 }
 
+/// Of two errors of the sealed blocks: by more than chance may do.
+bool worse(double error, double than) { return error > 1.1 * than; }
+
 /// What the opened seal refutes: single names, or all of them, since which is wrong is not known, and another
 /// for the same would be chosen by the seal.
 struct Refuted {
   std::vector<Term> terms;
+  std::vector<std::string> why;  // of each of `terms`
   bool all = false;
-  std::vector<std::string> said;
 };
 
 Refuted refuted(const Explanation& explanation) {
-  constexpr double kWorse = 1.1;
   Refuted result;
-  std::vector<std::string> names;
+  bool any = false;
   for (const AdoptedEffect& adopted : explanation.adopted) {
-    if (!adopted.term.effect->theory_only) names.push_back(adopted.term.label());
+    any = any || !adopted.term.effect->theory_only;
     const std::string why = refutation(adopted);
     if (why.empty()) continue;
     result.terms.push_back(adopted.term);
-    result.said.push_back(fmt::format("{} was found and is taken back: with the sealed blocks in, {}",
-                                      adopted.term.label(), why));
+    result.why.push_back(why);
   }
-  result.all = result.terms.empty() && !names.empty() &&
-               explanation.named_held_out_rmse > kWorse * explanation.before.held_out_rmse;
-  if (result.all)
-    result.said.push_back(fmt::format(
-        "{} found and taken back: the error of the sealed blocks is {:.4g} {} with {}, {:.4g} without",
-        fmt::join(names, ", "), explanation.named_held_out_rmse, explanation.unit,
-        names.size() > 1 ? "them" : "it", explanation.before.held_out_rmse));
+  result.all =
+      result.terms.empty() && any && worse(explanation.named_held_out_rmse, explanation.before.held_out_rmse);
   return result;
 }
 
+std::string taken_back_all(const Explanation& explanation) {
+  std::vector<std::string> names;
+  for (const AdoptedEffect& adopted : explanation.adopted)
+    if (!adopted.term.effect->theory_only) names.push_back(adopted.term.label());
+  return fmt::format(
+      "{} found and taken back: the error of the sealed blocks is {:.4g} {} with {}, {:.4g} without",
+      fmt::join(names, ", "), explanation.named_held_out_rmse, explanation.unit,
+      names.size() > 1 ? "them" : "it", explanation.before.held_out_rmse);
+}
+
 /// Once more without the names that are refuted: what they did may be structure whose cause is not known.
+/// Where the names predict the sealed blocks, and what is found without them does not, they stay.
 Explanation without_refuted(Explanation explanation, const Observations& observations,
                             std::vector<const Effect*> effects, SearchSettings settings) {
   std::vector<std::string> said;
-  for (Refuted found = refuted(explanation); !found.said.empty(); found = refuted(explanation)) {
-    said.insert(said.end(), found.said.begin(), found.said.end());
+  bool stand = false;
+  for (Refuted found = refuted(explanation); !stand && (found.all || !found.terms.empty());
+       found = refuted(explanation)) {
     settings.taken_back.insert(settings.taken_back.end(), found.terms.begin(), found.terms.end());
     if (found.all) std::erase_if(effects, [](const Effect* effect) { return !effect->theory_only; });
-    explanation = explain_once(observations, effects, settings);
+    Explanation without = explain_once(observations, effects, settings);
+    stand = worse(explanation.before.held_out_rmse, explanation.named_held_out_rmse) &&
+            worse(without.named_held_out_rmse, explanation.named_held_out_rmse);
+    if (found.all) said.push_back(taken_back_all(explanation));
+    for (std::size_t k = 0; k < found.terms.size(); ++k)
+      said.push_back(
+          found.terms[k].label() +
+          (stand ? " stays, since the sealed blocks are predicted worse without it, though with them in, "
+                 : " was found and is taken back: with the sealed blocks in, ") +
+          found.why[k]);
+    if (!stand) explanation = std::move(without);
   }
   explanation.warnings.insert(explanation.warnings.end(), said.begin(), said.end());
   return explanation;
