@@ -88,20 +88,21 @@ struct Refuted {
   std::vector<Term> terms;
   std::vector<std::string> why;  // of each of `terms`
   bool all = false;
+  bool any() const { return all || !terms.empty(); }
 };
 
 Refuted refuted(const Explanation& explanation) {
   Refuted result;
-  bool any = false;
+  bool refutable = false;
   for (const AdoptedEffect& adopted : explanation.adopted) {
-    any = any || !adopted.term.effect->theory_only;
+    refutable = refutable || !adopted.term.effect->theory_only;
     const std::string why = refutation(adopted);
     if (why.empty()) continue;
     result.terms.push_back(adopted.term);
     result.why.push_back(why);
   }
-  result.all =
-      result.terms.empty() && any && worse(explanation.named_held_out_rmse, explanation.before.held_out_rmse);
+  result.all = result.terms.empty() && refutable &&
+               worse(explanation.named_held_out_rmse, explanation.before.held_out_rmse);
   return result;
 }
 
@@ -120,22 +121,21 @@ std::string taken_back_all(const Explanation& explanation) {
 Explanation without_refuted(Explanation explanation, const Observations& observations,
                             std::vector<const Effect*> effects, SearchSettings settings) {
   std::vector<std::string> said;
-  bool stand = false;
-  for (Refuted found = refuted(explanation); !stand && (found.all || !found.terms.empty());
-       found = refuted(explanation)) {
+  for (Refuted found = refuted(explanation); found.any(); found = refuted(explanation)) {
     settings.taken_back.insert(settings.taken_back.end(), found.terms.begin(), found.terms.end());
     if (found.all) std::erase_if(effects, [](const Effect* effect) { return !effect->theory_only; });
     Explanation without = explain_once(observations, effects, settings);
-    stand = worse(explanation.before.held_out_rmse, explanation.named_held_out_rmse) &&
-            worse(without.named_held_out_rmse, explanation.named_held_out_rmse);
+    const bool stay = worse(explanation.before.held_out_rmse, explanation.named_held_out_rmse) &&
+                      worse(without.named_held_out_rmse, explanation.named_held_out_rmse);
     if (found.all) said.push_back(taken_back_all(explanation));
     for (std::size_t k = 0; k < found.terms.size(); ++k)
       said.push_back(
           found.terms[k].label() +
-          (stand ? " stays, since the sealed blocks are predicted worse without it, though with them in, "
-                 : " was found and is taken back: with the sealed blocks in, ") +
+          (stay ? " stays, since the sealed blocks are predicted worse without it, though with them in, "
+                : " was found and is taken back: with the sealed blocks in, ") +
           found.why[k]);
-    if (!stand) explanation = std::move(without);
+    if (stay) break;
+    explanation = std::move(without);
   }
   explanation.warnings.insert(explanation.warnings.end(), said.begin(), said.end());
   return explanation;
