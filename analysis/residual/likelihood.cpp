@@ -1,6 +1,7 @@
 #include "analysis/residual/likelihood.h"
 
 #include "analysis/residual/evidence_table.h"
+#include "analysis/residual/session_directions.h"
 
 #include <algorithm>
 #include <array>
@@ -51,9 +52,12 @@ struct CandidateScan::Impl {
   std::vector<Candidate> candidates;
   std::vector<Index> first;  // column of each candidate
   Index all_columns = 0;     // adopted first, then all candidates'
-  /// Of each stratum those that are not 0 there, and which they are: few effects change a run's course.
-  std::vector<Stacked> stacked;
+  /// Of each stratum, projected at ratio 0, those that are not 0 there, and which they are: few effects
+  /// change a run's course.
+  std::vector<Stacked> projected;
   std::vector<std::vector<Index>> used;
+  std::vector<SessionDirections> sessions;  // of each stratum, and the columns' coordinates in them
+  std::vector<Stacked> by_session;
   std::vector<std::vector<Products>> products;  // stratum, ratio
   std::map<std::pair<int, Index>, EvidenceTable> tables;
   std::vector<const EvidenceTable*> table_of;
@@ -69,54 +73,61 @@ struct CandidateScan::Impl {
     }
     all_columns = static_cast<Index>(items.size());
     touches.assign(candidates.size(), std::vector<bool>(model.strata().size(), false));
-    for (std::size_t s = 0; s < model.strata().size(); ++s) stack_used(s, items);
-    products.assign(model.strata().size(), std::vector<Products>(model.ratios()));
-    in_two_threads(model.strata().size() * model.ratios(), [&](std::size_t k) {
-      const std::size_t s = k / model.ratios(), ratio = k % model.ratios();
-      products[s][ratio] = multiply(s, ratio, stacked[s]);
-    });
+    for (std::size_t s = 0; s < model.strata().size(); ++s) {
+      project_used(s, items);
+      sessions.emplace_back(model, s);
+      by_session.push_back(sessions[s].coordinates(projected[s]));
+    }
+    products.resize(model.strata().size());
+    in_two_threads(model.strata().size(), [&](std::size_t s) { products[s] = multiply(s); });
     for (std::size_t s = 0; s < model.strata().size(); ++s) mark_touched(s);
     for (std::size_t i = 0; i < candidates.size(); ++i) table_of.push_back(table_for(i));
   }
 
-  void stack_used(std::size_t s, const std::vector<const Components*>& items) {
-    used.emplace_back();
+  void project_used(std::size_t s, const std::vector<const Components*>& items) {
+    constexpr double kNothing =
+        1e-14;  // of a column's squares: what is left of what the baseline has is rounding
     std::vector<const Components*> of_stratum;
+    std::vector<Index> columns;
     for (std::size_t i = 0; i < items.size(); ++i)
       if (!(*items[i])[model.strata()[s].component].isZero(0)) {
-        used[s].push_back(static_cast<Index>(i));
+        columns.push_back(static_cast<Index>(i));
         of_stratum.push_back(items[i]);
       }
-    stacked.push_back(model.stack(s, of_stratum));
-    if (model.strata()[s].means()) leave_out_what_the_baseline_has(s);
-  }
-
-  /// What is left of such a column is rounding, and its amplitude would be anything.
-  void leave_out_what_the_baseline_has(std::size_t s) {
-    constexpr double kNothing = 1e-14;  // of its squares
-    Stacked left = stacked[s];
+    const Stacked stacked = model.stack(s, of_stratum);
+    Stacked left = stacked;
     model.project(s, 0, left);
-    std::vector<Index> kept, columns;
+    std::vector<Index> kept;
+    used.emplace_back();
     for (Index c = 0; c < left.cols(); ++c)
-      if (left.col(c).squaredNorm() > kNothing * stacked[s].col(c).squaredNorm()) {
-        kept.push_back(used[s][static_cast<std::size_t>(c)]);
-        columns.push_back(c);
+      if (left.col(c).squaredNorm() > kNothing * stacked.col(c).squaredNorm()) {
+        kept.push_back(c);
+        used[s].push_back(columns[static_cast<std::size_t>(c)]);
       }
-    if (kept.size() == used[s].size()) return;
-    used[s] = std::move(kept);
-    stacked[s] = Stacked(stacked[s](Eigen::all, columns));
+    projected.emplace_back(left(Eigen::all, kept));
   }
 
-  Products multiply(std::size_t s, std::size_t ratio, Stacked projected) const {
-    Products result;
-    model.project(s, ratio, projected);
-    Stacked c = Stacked::Zero(projected.rows(), all_columns);
-    c(Eigen::all, used[s]) = projected;
-    result.adopted_adopted = c.leftCols(adopted).transpose() * c.leftCols(adopted);
-    result.adopted_candidate = c.leftCols(adopted).transpose() * c;
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      const auto own = c.middleCols(first[i], static_cast<Index>(candidates[i].columns.size()));
-      result.candidate.emplace_back(own.transpose() * own);
+  std::vector<Products> multiply(std::size_t s) const {
+    const auto all = [&](const Stacked& of_used) {
+      Stacked result = Stacked::Zero(of_used.rows(), all_columns);
+      result(Eigen::all, used[s]) = of_used;
+      return result;
+    };
+    const Stacked c = all(projected[s]), in_sessions = all(by_session[s]);
+    std::vector<Products> result(model.ratios());
+    for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
+      const Eigen::VectorXd weights = sessions[s].weights(kRatios[ratio]);
+      const auto product = [&](Index first_a, Index a, Index first_b, Index b) -> MatrixXd {
+        return c.middleCols(first_a, a).transpose() * c.middleCols(first_b, b) -
+               in_sessions.middleCols(first_a, a).transpose() * weights.asDiagonal() *
+                   in_sessions.middleCols(first_b, b);
+      };
+      result[ratio].adopted_adopted = product(0, adopted, 0, adopted);
+      result[ratio].adopted_candidate = product(0, adopted, 0, all_columns);
+      for (std::size_t i = 0; i < candidates.size(); ++i) {
+        const auto own = static_cast<Index>(candidates[i].columns.size());
+        result[ratio].candidate.push_back(product(first[i], own, first[i], own));
+      }
     }
     return result;
   }
@@ -141,20 +152,33 @@ struct CandidateScan::Impl {
 
   using Data = std::vector<std::vector<DataProducts>>;  // stratum, ratio
 
-  Data multiply_data(const std::vector<Stacked>& data) const {
+  Data multiply_data(std::vector<Stacked> data) const {
     Data result(data.size(), std::vector<DataProducts>(model.ratios()));
-    in_two_threads(data.size() * model.ratios(), [&](std::size_t k) {
-      const std::size_t s = k / model.ratios(), ratio = k % model.ratios();
-      DataProducts& products_of = result[s][ratio];
-      Stacked projected = data[s];
-      model.project(s, ratio, projected);
-      products_of.squares = projected.colwise().squaredNorm().transpose();
-      // In place of the columns' projections at every ratio, which would fill the memory.
-      model.whiten_transposed(s, ratio, projected);
-      products_of.columns = MatrixXd::Zero(all_columns, projected.cols());
-      products_of.columns(used[s], Eigen::all) = stacked[s].transpose() * projected;
+    for (std::size_t s = 0; s < data.size(); ++s)
+      for (DataProducts& products_of : result[s]) {
+        products_of.squares.resize(data[s].cols());
+        products_of.columns = MatrixXd::Zero(all_columns, data[s].cols());
+      }
+    in_two_threads(2 * data.size(), [&](std::size_t k) {  // half of the data sets of a stratum
+      const std::size_t s = k / 2;
+      const Index half = data[s].cols() / 2, from = k % 2 == 0 ? 0 : half;
+      multiply_data(s, data[s].middleCols(from, k % 2 == 0 ? half : data[s].cols() - half), from, result[s]);
     });
     return result;
+  }
+
+  void multiply_data(std::size_t s, Stacked sets, Index from, std::vector<DataProducts>& result) const {
+    model.project(s, 0, sets);
+    const Stacked in_sessions = sessions[s].coordinates(sets);
+    const Eigen::VectorXd squares = sets.colwise().squaredNorm();
+    const MatrixXd columns = projected[s].transpose() * sets;
+    for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
+      const Stacked weighted = sessions[s].weights(kRatios[ratio]).asDiagonal() * in_sessions;
+      result[ratio].squares.segment(from, sets.cols()) =
+          squares - weighted.cwiseProduct(in_sessions).colwise().sum().transpose();
+      result[ratio].columns(used[s], Eigen::seqN(from, sets.cols())) =
+          columns - by_session[s].transpose() * weighted;
+    }
   }
 
   // --- one data set
@@ -330,11 +354,11 @@ CandidateScan::~CandidateScan() = default;
 NullFit CandidateScan::null_fit(const Components& y) const {
   std::vector<Stacked> data;
   for (std::size_t s = 0; s < impl_->model.strata().size(); ++s) data.push_back(impl_->model.stack(s, {&y}));
-  const Impl::Data products = impl_->multiply_data(data);
+  const Impl::Data products = impl_->multiply_data(std::move(data));
   const Impl::State state = impl_->best_without(products, 0);
   NullFit result{
       .ratio = state.ratio, .sigma = {}, .ratio_probability = {}, .log_likelihood = state.log_likelihood};
-  for (std::size_t s = 0; s < data.size(); ++s) {
+  for (std::size_t s = 0; s < impl_->model.strata().size(); ++s) {
     const double dof = static_cast<double>(impl_->model.dof(s)) - impl_->spent(products, state, s);
     result.sigma.push_back(std::sqrt(state.rss[s] / std::max(dof, 1.0)));
     std::vector<double> probability;
@@ -355,7 +379,7 @@ NullFit CandidateScan::null_fit(const Components& y) const {
 std::vector<CandidateFit> CandidateScan::fit(const Components& y) const {
   std::vector<Stacked> data;
   for (std::size_t s = 0; s < impl_->model.strata().size(); ++s) data.push_back(impl_->model.stack(s, {&y}));
-  const Impl::Data products = impl_->multiply_data(data);
+  const Impl::Data products = impl_->multiply_data(std::move(data));
   const Impl::State null = impl_->best_without(products, 0);
   std::vector<CandidateFit> result;
   for (std::size_t i = 0; i < impl_->candidates.size(); ++i)
@@ -376,7 +400,7 @@ std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::si
                                          impl_->model.run_correlation(s), random,
                                          null.sizes.empty() ? Eigen::MatrixXd() : null.sizes[s]));
   }
-  const Impl::Data products = impl_->multiply_data(data);
+  const Impl::Data products = impl_->multiply_data(std::move(data));
   std::vector<double> maxima(count, 0.0);
   in_two_threads(count, [&](std::size_t set) {
     const Impl::State state = impl_->best_without(products, static_cast<Index>(set));

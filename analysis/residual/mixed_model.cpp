@@ -301,12 +301,6 @@ void MixedModel::project(std::size_t stratum, std::size_t ratio, Stacked& column
   root.apply(by_mode);
 }
 
-void MixedModel::whiten_transposed(std::size_t stratum, std::size_t ratio, Stacked& projected) const {
-  const Index n = static_cast<Index>(rows_.size());
-  Root(blocks_, run_scatter(stratum), kRatios[ratio], run_correlation(stratum))
-      .apply_transposed(Eigen::Map<MatrixXd>(projected.data(), n, projected.size() / n));
-}
-
 bool MixedModel::sees(const Components& column) const {
   double before = 0, after = 0;
   for (std::size_t s = 0; s < strata_.size(); ++s) {

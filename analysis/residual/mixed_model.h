@@ -72,10 +72,6 @@ class MixedModel {
   /// Whitens with the ratio and takes out what the baseline can absorb, in place.
   void project(std::size_t stratum, std::size_t ratio, Stacked& columns) const;
 
-  /// Of projected columns, in place: their products with columns that are not projected are then the products
-  /// with the projections of those.
-  void whiten_transposed(std::size_t stratum, std::size_t ratio, Stacked& projected) const;
-
   /// Whether more than rounding is left of a column without what the baseline can absorb.
   bool sees(const Components& column) const;
 
