@@ -20,9 +20,10 @@ struct Meaning {
 };
 
 constexpr std::string_view kNoDistance = "no distance from a wall: a distance is not negative";
+constexpr std::string_view kNoAmplitude = "no amplitude: an amplitude is not negative";
 constexpr double kLowest_Pa = 20e3, kHighest_Pa = 120e3;
 
-constexpr std::array<Meaning, 16> kMeanings = {
+constexpr std::array<Meaning, 26> kMeanings = {
     {{"thrust_N", "force"},
      {"c_t", "number"},
      {"c_t_helicopter", "number"},
@@ -41,7 +42,17 @@ constexpr std::array<Meaning, 16> kMeanings = {
      {"propeller_diameter_m", "length", 0, kNoLimit, "no diameter: a diameter is not negative"},
      {"ground_distance_R", "number", 0, kNoLimit, kNoDistance},
      {"ceiling_distance_R", "number", 0, kNoLimit, kNoDistance},
-     {"wall_distance_R", "number", 0, kNoLimit, kNoDistance}}};
+     {"wall_distance_R", "number", 0, kNoLimit, kNoDistance},
+     {"excitation_voltage_V", "voltage", 0, kNoLimit, "no excitation: it is not negative"},
+     {"adc_reference_V", "voltage", 0, kNoLimit, "no reference of a converter: it is not negative"},
+     {"clip_fraction", "number", 0, 1, "no share of samples, which is from 0 to 1, or from 0 to 100 %"},
+     {"mains_amplitude_V", "voltage", 0, kNoLimit, kNoAmplitude},
+     {"alias_amplitude_V", "voltage", 0, kNoLimit, kNoAmplitude},
+     {"vibration_amplitude_V", "voltage", 0, kNoLimit, kNoAmplitude},
+     {"cable_force_N", "force"},
+     {"tilt_deg", "angle"},
+     {"hours_in_session", "time"},
+     {"run_order", "number"}}};
 
 const Meaning* find_meaning(std::string_view name) {
   const auto* const found =

@@ -13,13 +13,14 @@ constexpr double kGravity = 9.80665;   // m/s², standard
 constexpr double kPound = 0.45359237;  // kg
 constexpr double kPi = std::numbers::pi;
 
-constexpr std::array<Unit, 65> kUnits = {{
+constexpr std::array<Unit, 93> kUnits = {{
     {"1", "number", 1, 0},
     {"", "number", 1, 0},
     {kTextUnit, "text", 1, 0},
     {"%", "number", 0.01, 0},
     {"N", "force", 1, 0},
     {"mN", "force", 1e-3, 0},
+    {"kN", "force", 1e3, 0},
     {"gf", "force", kGravity * 1e-3, 0},
     {"g", "force", kGravity * 1e-3, 0},
     {"kgf", "force", kGravity, 0},
@@ -38,6 +39,9 @@ constexpr std::array<Unit, 65> kUnits = {{
     {"in", "length", 0.0254, 0},
     {"ft", "length", 0.3048, 0},
     {"m2", "area", 1, 0},
+    {"m²", "area", 1, 0},
+    {"cm2", "area", 1e-4, 0},
+    {"cm²", "area", 1e-4, 0},
     {"°C", "temperature", 1, 0},
     {"degC", "temperature", 1, 0},
     {"C", "temperature", 1, 0},
@@ -49,11 +53,18 @@ constexpr std::array<Unit, 65> kUnits = {{
     {"hPa", "pressure", 100, 0},
     {"mbar", "pressure", 100, 0},
     {"kPa", "pressure", 1000, 0},
+    {"bar", "pressure", 1e5, 0},
+    {"atm", "pressure", 101325, 0},
+    {"mmHg", "pressure", 133.322387415, 0},
     {"psi", "pressure", 6894.757293168, 0},
     {"inHg", "pressure", 3386.389, 0},
     {"kg/m3", "density", 1, 0},
+    {"kg/m³", "density", 1, 0},
     {"V", "voltage", 1, 0},
     {"mV", "voltage", 1e-3, 0},
+    {"uV", "voltage", 1e-6, 0},
+    {"µV", "voltage", 1e-6, 0},
+    {"μV", "voltage", 1e-6, 0},
     {"V/V", "voltage ratio", 1, 0},
     {"mV/V", "voltage ratio", 1e-3, 0},
     {"uV/V", "voltage ratio", 1e-6, 0},
@@ -61,7 +72,10 @@ constexpr std::array<Unit, 65> kUnits = {{
     {"μV/V", "voltage ratio", 1e-6, 0},  // the Greek letter, where that above is the micro sign
     {"counts", "number", 1, 0},
     {"A", "current", 1, 0},
+    {"mA", "current", 1e-3, 0},
     {"W", "power", 1, 0},
+    {"mW", "power", 1e-3, 0},
+    {"kW", "power", 1e3, 0},
     {"s", "time", 1, 0},
     {"ms", "time", 1e-3, 0},
     {"us", "time", 1e-6, 0},
@@ -69,14 +83,28 @@ constexpr std::array<Unit, 65> kUnits = {{
     {"μs", "time", 1e-6, 0},
     {"min", "time", 60, 0},
     {"h", "time", 3600, 0},
+    {"d", "time", 86400, 0},
     {"Hz", "frequency", 1, 0},
+    {"kHz", "frequency", 1e3, 0},
     {"m/s", "velocity", 1, 0},
     {"kt", "velocity", 1852.0 / 3600, 0},
     {"km/h", "velocity", 1 / 3.6, 0},
     {"mph", "velocity", 0.44704, 0},
+    {"cm/s", "velocity", 1e-2, 0},
+    {"ft/s", "velocity", 0.3048, 0},
     {"rad", "angle", 1, 0},
     {"deg", "angle", kPi / 180, 0},
+    {"°", "angle", kPi / 180, 0},
     {"N·m", "torque", 1, 0},
+    {"N m", "torque", 1, 0},
+    {"N*m", "torque", 1, 0},
+    {"Nm", "torque", 1, 0},
+    {"mN·m", "torque", 1e-3, 0},
+    {"mN m", "torque", 1e-3, 0},
+    {"mNm", "torque", 1e-3, 0},
+    {"ozf·in", "torque", kPound* kGravity / 16 * 0.0254, 0},
+    {"lbf·in", "torque", kPound* kGravity * 0.0254, 0},
+    {"lbf·ft", "torque", kPound* kGravity * 0.3048, 0},
     {"N/W", "efficiency", 1, 0},
     {"gf/W", "efficiency", kGravity * 1e-3, 0},
 }};
@@ -89,8 +117,10 @@ const Unit& unit_from_name(std::string_view name) {
   if (found != kUnits.end()) return *found;
   std::vector<std::string_view> names;
   names.reserve(kUnits.size());
-  for (const Unit& unit : kUnits) names.push_back(unit.name);
-  throw InputError(fmt::format("'{}' is not a known unit; known are {}", name, fmt::join(names, " ")));
+  for (const Unit& unit : kUnits)
+    if (!unit.name.empty()) names.push_back(unit.name);
+  throw InputError(fmt::format("'{}' is not a known unit; write 1 for a number of any other; known are {}",
+                               name, fmt::join(names, " ")));
 }
 
 std::string_view unit_after_conversion(std::string_view name) {

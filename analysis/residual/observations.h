@@ -111,7 +111,7 @@ struct Observations {
 
   bool line_of_cell = false;            // a linear baseline that is over what a cell is loaded with
   std::string baseline_over;            // covariate that a table's line or power law is over; or empty
-  std::vector<std::string> other_axes;  // covariates of the same quantity as a linear baseline's column
+  std::vector<std::string> other_axes;  // covariates of a linear baseline's quantity
 
   Eigen::Index rows() const { return y.rows(); }
   Eigen::Index channels() const { return y.cols(); }

@@ -2,6 +2,7 @@
 #include "analysis/residual/expression.h"
 #include "analysis/residual/observations.h"
 #include "analysis/residual/parts_of_equal_size.h"
+#include "analysis/residual/table_source.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -20,33 +21,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kAtRest = 0.05;  // of a group's highest speed
-
-/// The rows that are used, of the table.
-struct Source {
-  const ObservationTable& table;
-  std::vector<std::size_t> rows;
-
-  Index count() const { return static_cast<Index>(rows.size()); }
-  const Observation& row(Index r) const { return table.rows[rows[static_cast<std::size_t>(r)]]; }
-  double cell(Index r, const std::string& column) const {
-    return table.sheet.number(rows[static_cast<std::size_t>(r)], column).value_or(kNaN);
-  }
-  std::vector<double> numbers(const std::string& column) const {
-    std::vector<double> result;
-    for (const std::size_t row : rows) result.push_back(table.sheet.require_number(row, column));
-    return result;
-  }
-  std::vector<std::string> texts(const std::string& column) const {
-    std::vector<std::string> result;
-    for (const std::size_t row : rows) result.push_back(table.sheet.text(row, column));
-    return result;
-  }
-  double converted(Index r, const TableColumn& column) const {
-    const double mechanical = column.column == table.schema.speed_column ? table.schema.speed_factor : 1;
-    return column.converted(cell(r, column.column)) * mechanical;
-  }
-};
 
 /// What the schema says of a column; a pure number where it says nothing.
 TableColumn described(const TableSchema& schema, const std::string& name) {
@@ -55,24 +29,8 @@ TableColumn described(const TableSchema& schema, const std::string& name) {
   return {.column = name, .unit = "1", .meaning = ""};
 }
 
-/// Leaves out rows whose motor stood.
-Source moving_rows(const ObservationTable& table, Observations& result) {
-  std::map<std::string, double> highest;
-  for (const Observation& row : table.rows)
-    highest[row.group] = std::max(highest[row.group], row.speed_rpm.value_or(0));
-  Source source{table, {}};
-  for (std::size_t r = 0; r < table.rows.size(); ++r) {
-    const Observation& row = table.rows[r];
-    if (row.speed_rpm && highest[row.group] > 0 && *row.speed_rpm <= kAtRest * highest[row.group]) continue;
-    source.rows.push_back(r);
-  }
-  const std::size_t resting = table.rows.size() - source.rows.size();
-  if (resting > 0) result.left_out.push_back(fmt::format("{} rows: the motor stood", resting));
-  return source;
-}
-
 /// A covariate's name: what it means where the schema says so, else its column.
-void add_covariates(const Source& source, Observations& result) {
+void add_covariates(const TableSource& source, Observations& result) {
   const TableSchema& schema = source.table.schema;
   const auto add = [&](const std::string& name, std::string_view unit, const auto& value_of,
                        bool derived = false) {
@@ -101,9 +59,9 @@ void add_covariates(const Source& source, Observations& result) {
   add("air_temperature_C", "°C", [&](Index r) { return source.row(r).air_temperature_C; });
 }
 
-void set_response(const Source& source, const ObservationChoice& choice, Observations& result) {
+void set_response(const TableSource& source, const ObservationChoice& choice, Observations& result) {
   const TableSchema& schema = source.table.schema;
-  const bool own = choice.response.empty() || choice.response == schema.response.column;
+  const bool own = is_own_response(schema, choice);
   const TableColumn column = own ? schema.response : described(schema, choice.response);
   result.response = column.column;
   source.table.sheet.require(column.column);
@@ -111,8 +69,7 @@ void set_response(const Source& source, const ObservationChoice& choice, Observa
   result.coefficient = own && column.meaning.starts_with("c_t");
   const MatrixXd ones = MatrixXd::Ones(source.count(), 1);
   result.value = result.known = ones;
-  // C_T is what is constant where speed and diameter are known; a baseline in another column replaces that.
-  const bool reduced = own && column.meaning == "thrust_N" && choice.baseline.empty() && schema.speed_column;
+  const bool reduced = is_reduced(source.table, choice);
   result.coefficient = result.coefficient || reduced;
   const std::string_view quantity = unit_from_name(column.unit).quantity;
   result.of_air = own && !reduced && (!column.meaning.empty() || quantity == "power" || quantity == "torque");
@@ -121,7 +78,7 @@ void set_response(const Source& source, const ObservationChoice& choice, Observa
     result.value(r, 0) = source.converted(r, column);
     if (std::isnan(result.value(r, 0)))
       throw InputError::in(row.place, "the response {} is empty", result.response);
-    if (!reduced || !row.speed_rpm || !row.diameter_m) continue;
+    if (!reduced) continue;
     const double density = dry_air_density_kg_m3(row.air_pressure_Pa, row.air_temperature_C + kZeroCelsius_K);
     result.known(r, 0) =
         density * std::pow(*row.speed_rpm / 60, 2) * std::pow(*row.diameter_m, 4);  // T = C_T ρ n² D⁴
@@ -130,8 +87,7 @@ void set_response(const Source& source, const ObservationChoice& choice, Observa
 
 /// A cell's volts scatter alike under any load; what a rotor gives scatters with its size.
 bool scatters_alike(const TableSchema& schema, const ObservationChoice& choice) {
-  if (!choice.response.empty() && choice.response != schema.response.column) return false;
-  if (choice.baseline.starts_with("power:")) return false;
+  if (!is_own_response(schema, choice) || choice.baseline.starts_with("power:")) return false;
   if (!schema.scatter.empty()) return schema.scatter == "absolute";
   return unit_from_name(schema.response.unit).quantity == "voltage";
 }
@@ -178,7 +134,7 @@ void as_schema_says(const TableSchema& schema, int line, const std::string& key,
   }
 }
 
-void set_blocks(const Source& source, Observations& result) {
+void set_blocks(const TableSource& source, Observations& result) {
   const TableSchema& schema = source.table.schema;
   if (schema.bins) {
     as_schema_says(schema, schema.blocks_line, "blocks", schema.blocks, [&] {
@@ -199,7 +155,7 @@ void set_blocks(const Source& source, Observations& result) {
   }
 }
 
-void set_belonging(const Source& source, Observations& result) {
+void set_belonging(const TableSource& source, Observations& result) {
   std::map<std::string, int> known;
   for (Index r = 0; r < source.count(); ++r) {
     result.group.push_back(index_in(known, result.group_name, source.row(r).group));
@@ -211,7 +167,7 @@ void set_belonging(const Source& source, Observations& result) {
 }
 
 /// Place of a row's value within its group, 0 to 1.
-VectorXd ranks(const Source& source, const Observations& result, const std::string& column) {
+VectorXd ranks(const TableSource& source, const Observations& result, const std::string& column) {
   std::map<int, std::vector<Index>> groups;
   for (Index r = 0; r < source.count(); ++r) groups[result.group[static_cast<std::size_t>(r)]].push_back(r);
   VectorXd rank(source.count());
@@ -224,7 +180,7 @@ VectorXd ranks(const Source& source, const Observations& result, const std::stri
   return rank;
 }
 
-std::vector<bool> held_out_rows(const Source& source, const Observations& result,
+std::vector<bool> held_out_rows(const TableSource& source, const Observations& result,
                                 const Expression& expression) {
   std::vector<VectorXd> columns;
   for (const std::string& name : expression.names()) {
@@ -250,7 +206,7 @@ std::vector<bool> held_out_rows(const Source& source, const Observations& result
   return held_out;
 }
 
-void set_hold_out(const Source& source, Observations& result) {
+void set_hold_out(const TableSource& source, Observations& result) {
   const TableSchema& schema = source.table.schema;
   if (schema.hold_out.empty()) return;
   const Expression expression(schema.hold_out,
@@ -268,18 +224,18 @@ void check_groups(const TableSchema& schema, const Observations& result) {
                        fmt::join(schema.groups, "\", \""));
 }
 
-/// Columns of the same quantity as the baseline's, for crosstalk.
+/// Columns of the same quantity as the baseline's, for crosstalk; forces and torques are loads alike.
 void set_other_axes(const TableSchema& schema, const std::string& baseline, Observations& result) {
-  std::string_view quantity;
-  for (const TableColumn& column : schema.covariates)
-    if (column.column == baseline) quantity = unit_from_name(column.unit).quantity;
+  const auto quantity_of = [](const TableColumn& column) {
+    const std::string_view quantity = unit_from_name(column.unit).quantity;
+    return quantity == "torque" ? "force" : quantity;
+  };
   // A load that is the baseline need not be a covariate: the others' unit says what it is.
+  std::string_view quantity = "force";
   for (const TableColumn& column : schema.covariates)
-    if (quantity.empty() && unit_from_name(column.unit).quantity == "force")
-      quantity = unit_from_name(column.unit).quantity;
+    if (column.column == baseline) quantity = quantity_of(column);
   for (const TableColumn& column : schema.covariates)
-    if (column.column != baseline && column.column != result.response && !quantity.empty() &&
-        unit_from_name(column.unit).quantity == quantity)
+    if (column.column != baseline && column.column != result.response && quantity_of(column) == quantity)
       result.other_axes.push_back(column.name());
 }
 
@@ -296,7 +252,7 @@ void set_groups_within_blocks(Observations& result) {
 
 /// What the baseline is over is a condition as well: a curve over it shows where a line or a power law is
 /// wrong. Returns its name there.
-std::string keep_as_covariate(const Source& source, const std::string& column, Observations& result) {
+std::string keep_as_covariate(const TableSource& source, const std::string& column, Observations& result) {
   for (const TableColumn& each : source.table.schema.covariates)
     if (each.column == column) return each.name();
   Covariate covariate{column, MatrixXd(source.count(), 1)};
@@ -324,7 +280,7 @@ void set_previous(Observations& result) {
 }
 
 /// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
-void set_baseline(const Source& source, const ObservationChoice& choice, Observations& result) {
+void set_baseline(const TableSource& source, const ObservationChoice& choice, Observations& result) {
   result.baseline = choice.baseline.empty() ? "constant" : choice.baseline;
   if (result.baseline == "constant") return;
   const auto colon = result.baseline.find(':');
@@ -363,7 +319,7 @@ void set_baseline(const Source& source, const ObservationChoice& choice, Observa
 
 TableParts check_table(const ObservationTable& table) {
   Observations result;
-  const Source source = moving_rows(table, result);
+  const TableSource source = used_rows(table, {}, result);
   set_belonging(source, result);
   set_hold_out(source, result);
   return {result.groups(), result.blocks()};
@@ -372,7 +328,7 @@ TableParts check_table(const ObservationTable& table) {
 Observations observe_table(const ObservationTable& table, const ObservationChoice& choice) {
   Observations result;
   result.campaign = table.schema.name;
-  const Source source = moving_rows(table, result);
+  const TableSource source = used_rows(table, choice, result);
   set_belonging(source, result);
   check_groups(table.schema, result);
   set_response(source, choice, result);

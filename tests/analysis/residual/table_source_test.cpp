@@ -1,0 +1,87 @@
+// Which rows of a table are explained, and as what.
+#include "analysis/residual/tables.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+namespace tunnelrig {
+namespace {
+
+using test::explained;
+using test::TablesTest;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+struct TableSourceTest : TablesTest {
+  static constexpr const char* kThrustAndSpeed =
+      "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+      "[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n";
+  static constexpr const char* kPropeller = "[propeller]\ndiameter_m = 0.2\n";
+
+  /// Thrust that goes with the speed to the power of 2.15, twelve days.
+  std::string thrusts() {
+    std::string csv = "b,N,y\n";
+    for (int r = 0; r < 96; ++r) {
+      const double rpm = 3000 + 4000 * even(random);
+      csv += fmt::format("{},{},{}\n", r / 8, rpm,
+                         6 * std::pow(rpm / 5000, 2.15) * (1 + 0.003 * scatter(random)));
+    }
+    return csv;
+  }
+};
+
+/// Without a diameter there is no C_T: what the speed does is there to be found.
+TEST_F(TableSourceTest, AThrustOverSpeedWithoutAPropellerGoesWithTheSpeed) {
+  const Observations o = observed(thrusts(), kThrustAndSpeed);
+  EXPECT_FALSE(o.coefficient);
+  EXPECT_EQ(names(explained(o)), "rotor_speed reynolds_number ");
+}
+
+TEST_F(TableSourceTest, WithOneItIsExplainedAsC_T) {
+  const Observations o = observed(thrusts(), std::string(kThrustAndSpeed) + kPropeller);
+  EXPECT_TRUE(o.coefficient);
+  const Explanation e = explained(o);
+  EXPECT_EQ(names(e), "reynolds_number ");
+  EXPECT_NEAR(e.adopted[0].parameters[0].value, 0.15, 0.02);
+}
+
+/// A day whose tachometer never locked, a cell that was left empty, a motor that stood.
+TEST_F(TableSourceTest, RowsWithoutASpeedHaveNoC_TAndAreSaid) {
+  std::string csv = thrusts();
+  for (int r = 0; r < 9; ++r) csv += fmt::format("dark,0,{}\n", 3 + 0.1 * r);
+  csv += "3,,5\n4,10,0.01\n";
+  const std::string schema = "groups = [\"b\"]\n" + std::string(kThrustAndSpeed);
+  const Observations o = observed(csv, schema + kPropeller);
+  EXPECT_EQ(o.rows(), 96);
+  EXPECT_TRUE(o.multiplicative);
+  EXPECT_THAT(o.left_out,
+              ElementsAre("1 rows: the motor stood", "10 rows: no speed was read, so they have no C_T"));
+  EXPECT_EQ(observed(csv, schema).rows(), 106);  // they do have a thrust
+}
+
+/// Of a cell for forces and moments: both load it.
+TEST_F(TableSourceTest, AForceLeaksIntoAMoment) {
+  std::string csv = "series,fy,mx,y\n";
+  for (const char* series : {"fy", "mx"})
+    for (const double load : {0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0}) {
+      const double fy = series[0] == 'f' ? load : 0, mx = series[0] == 'm' ? 0.15 * load : 0;
+      csv += fmt::format("{},{},{},{}\n", series, fy, mx, mx - 0.02 * fy + 0.001 * scatter(random));
+    }
+  const Observations o = observed(csv,
+                                  "groups = [\"series\"]\n[response]\ncolumn = \"y\"\nunit = \"N m\"\n"
+                                  "[[covariates]]\ncolumn = \"fy\"\nunit = \"N\"\n"
+                                  "[[covariates]]\ncolumn = \"mx\"\nunit = \"N m\"\n",
+                                  "linear:mx");
+  EXPECT_THAT(o.other_axes, ElementsAre("fy"));
+  const TableEffects effects(o, test::every_effect());
+  const Explanation e = explain(o, effects.all, test::quick());
+  EXPECT_EQ(names(e), "crosstalk ");
+  EXPECT_NEAR(e.adopted[0].parameters[0].value, -0.02, 0.002);
+  EXPECT_EQ(effects.all.back()->parameters[0].unit, "N·m/N");
+}
+
+}  // namespace
+}  // namespace tunnelrig
