@@ -2,9 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace tunnelrig {
+namespace {
+
+constexpr double kFarthestBend = 2;  // |s|: half of the range on either side
+
+}  // namespace
 
 bool is_of_logarithm(CurveShape shape) {
   return shape == CurveShape::kLogParabola || shape == CurveShape::kLevelling ||
@@ -14,15 +20,18 @@ bool is_of_logarithm(CurveShape shape) {
 double Strength::at(double x) const { return std::clamp((x - centre) / scale, -1.0, 1.0); }
 
 double curve_straight(CurveShape shape, double x, double low, double high) {
-  return 2 * (is_of_logarithm(shape) ? std::log(x / low) / std::log(high / low) : (x - low) / (high - low)) -
-         1;
+  const double u = is_of_logarithm(shape) ? x > 0 ? std::log(x / low) / std::log(high / low)
+                                                  : -std::numeric_limits<double>::infinity()
+                                          : (x - low) / (high - low);
+  const double farthest = shape == CurveShape::kWaves ? 1 : kFarthestBend;
+  return std::clamp(2 * u - 1, -farthest, farthest);
 }
 
 double curve_column(CurveShape shape, int k, double x, double low, double high) {
-  if (shape == CurveShape::kWaves) return std::cos(std::numbers::pi * k * (x - low) / (high - low));
-  const double straight = curve_straight(shape, x, low, high);
-  if (k > 1 || shape == CurveShape::kStraight || shape == CurveShape::kLogStraight) return straight;
-  return shape == CurveShape::kLevelling ? low / x : straight * straight;
+  const double s = curve_straight(shape, x, low, high);
+  if (shape == CurveShape::kWaves) return std::cos(std::numbers::pi * k * (s + 1) / 2);
+  if (k > 1 || shape == CurveShape::kStraight || shape == CurveShape::kLogStraight) return s;
+  return shape == CurveShape::kLevelling ? std::pow(low / high, (s + 1) / 2) : s * s;
 }
 
 double tilted_column(CurveShape shape, const std::vector<double>& tilt, std::size_t i, double x, double low,

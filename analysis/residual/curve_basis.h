@@ -27,7 +27,8 @@ struct Strength {
   double at(double x) const;
 };
 
-/// s: −1 at `low`, 1 at `high`, beyond them outside.
+/// s: −1 at `low`, 1 at `high`. Beyond them a bend goes on for half of the range and waves do not; from there
+/// on it stays as it is: what a curve does far from where it was seen is not known.
 double curve_straight(CurveShape shape, double x, double low, double high);
 
 /// The k-th column (from 1) at x; not of levels.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -93,14 +94,20 @@ int places_on_range(const Covariate& covariate, const std::vector<int>& rows) {
 
 /// What is straight, on the curve's rotors.
 MatrixXd straight_over(const Curve& curve) {
-  const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
   const MatrixXd& column = curve.columns[0][0];
   MatrixXd straight = MatrixXd::Zero(column.rows(), column.cols());
   for (Index row = 0; row < straight.rows(); ++row)
     for (Index c = 0; c < straight.cols(); ++c)
       if (straight.cols() == 1 || curve.rotor < 0 || c == curve.rotor)
-        straight(row, c) = curve_straight(curve.shape, curve.x(row, curve.x.cols() > 1 ? c : 0), low, high);
+        straight(row, c) =
+            curve_straight(curve.shape, curve.x(row, curve.x.cols() > 1 ? c : 0), curve.low, curve.high);
   return straight;
+}
+
+/// Where a curve may be seen: beyond it, in runs that are sealed, it could be anything.
+std::pair<double, double> range_of(const Covariate& covariate, const std::vector<int>& rows) {
+  const MatrixXd values = covariate.value(rows, Eigen::all);
+  return {values.minCoeff(), values.maxCoeff()};
 }
 
 /// Those that differ between `rows`, and not as one before does.
@@ -128,10 +135,12 @@ void add_products(const Observations& observations, const std::vector<int>& rows
   for (std::size_t a = 0; a < conditions.size(); ++a)
     for (std::size_t b = a + 1; b < conditions.size(); ++b) {
       const Covariate &first = *conditions[a], &second = *conditions[b];
-      const double low = first.value.minCoeff(), high = first.value.maxCoeff(), mean = first.value.mean();
+      const auto [low, high] = range_of(first, rows);
+      if (!(high > low)) continue;
+      const double mean = first.value.mean();
       const Eigen::ArrayXd from_mean = second.value.col(0).array() - second.value.mean();
       const Strength strength{.centre = second.value.mean(), .scale = from_mean.abs().maxCoeff()};
-      const auto column_at = [&](int k, double x) {
+      const auto column_at = [&, low = low, high = high](int k, double x) {
         return curve_column(CurveShape::kStraight, k, x, low, high) -
                curve_straight(CurveShape::kStraight, mean, low, high);
       };
@@ -139,6 +148,8 @@ void add_products(const Observations& observations, const std::vector<int>& rows
                   .shape = CurveShape::kStraight,
                   .columns = columns_over(observations, first, -1, 1, column_at),
                   .x = first.value,
+                  .low = low,
+                  .high = high,
                   .place = {second.name, from_mean / strength.scale},
                   .strength = strength};
       curve.columns[0][0] = curve.place.weight.asDiagonal() * curve.columns[0][0];
@@ -281,8 +292,9 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
     if (covariate.derived && covariate.name == "hour_of_day" && repeats_another(observations, covariate))
       continue;
     const int most = places_on_range(covariate, rows) / 3;
-    const double low = covariate.value.minCoeff(), high = covariate.value.maxCoeff();
-    const auto add = [&](CurveShape shape, int count, const Place& place = {}) {
+    const auto [low, high] = range_of(covariate, rows);
+    if (!(high > low)) continue;
+    const auto add = [&, low = low, high = high](CurveShape shape, int count, const Place& place = {}) {
       const auto column_at = [&](int k, double x) { return curve_column(shape, k, x, low, high); };
       for (const int rotor : rotors) {
         curves.push_back({.covariate = covariate.name,
@@ -290,6 +302,8 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
                           .shape = shape,
                           .columns = columns_over(observations, covariate, rotor, count, column_at),
                           .x = covariate.value,
+                          .low = low,
+                          .high = high,
                           .place = place});
         if (curves.back().everywhere()) continue;
         for (Components& column : curves.back().columns) column[0] = place.weight.asDiagonal() * column[0];

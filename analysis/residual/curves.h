@@ -20,6 +20,7 @@ struct Curve {
   std::vector<Components> columns;
   std::vector<double> tilt = {};          // of each column: what was taken out of it of s; empty: nothing
   Eigen::MatrixXd x;                      // n × 1 or n × c: what it is drawn against; empty for time_in_run
+  double low = 0, high = 1;               // of x, among the rows that decided how many bends there are
   std::vector<double> levels = {};        // of kLevels: the values told apart, the most common first
   std::vector<std::string> labels = {};   // of texts: value i + 1 stands for labels[i]
   Place place = {};                       // what it is drawn for is a weight of 1

@@ -37,11 +37,12 @@ std::vector<Drawn> drawn_levels(const Curve& curve) {
   return points;
 }
 
-std::vector<Drawn> drawn_curve(const Curve& curve, double low, double high) {
+/// From x = `from` to `to`, of a curve over `low` to `high`.
+std::vector<Drawn> drawn_curve(const Curve& curve, double from, double to, double low, double high) {
   constexpr int kPoints = 25;
   std::vector<Drawn> points;
   for (int p = 0; p < kPoints; ++p) {
-    const double x = low + static_cast<double>(p) / (kPoints - 1) * (high - low);
+    const double x = from + static_cast<double>(p) / (kPoints - 1) * (to - from);
     points.push_back({x, VectorXd(static_cast<Index>(curve.columns.size()))});
     for (std::size_t b = 0; b < curve.columns.size(); ++b)
       points.back().columns(static_cast<Index>(b)) = tilted_column(curve.shape, curve.tilt, b, x, low, high);
@@ -54,9 +55,10 @@ std::vector<Drawn> drawn_curve(const Curve& curve, double low, double high) {
 /// What is straight over a condition along which each group has a line (or a power law) of its own is that
 /// line's, of which the fit gives the curve a part or not: it is taken out of what is drawn.
 void take_out_baseline(const Observations& observations, const std::vector<int>& rows, const Curve& curve,
-                       double low, double high, std::vector<Drawn>& points) {
+                       std::vector<Drawn>& points) {
   if (observations.slopes.cols() == 0 || curve.x.cols() != 1 || curve.strength) return;
   const auto n = static_cast<Index>(rows.size()), k = static_cast<Index>(curve.columns.size());
+  const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
   for (const CurveShape shape : {CurveShape::kStraight, CurveShape::kLogStraight}) {
     if (is_of_logarithm(shape) && low <= 0) return;
     const auto straight = [&](double x) { return Eigen::Vector2d(1, curve_straight(shape, x, low, high)); };
@@ -69,7 +71,8 @@ void take_out_baseline(const Observations& observations, const std::vector<int>&
       line.row(r) = straight(x).transpose();
       slopes.row(r) = observations.slopes.row(row);
       for (Index b = 0; b < k; ++b)
-        columns(r, b) = tilted_column(curve.shape, curve.tilt, static_cast<std::size_t>(b), x, low, high);
+        columns(r, b) =
+            tilted_column(curve.shape, curve.tilt, static_cast<std::size_t>(b), x, curve.low, curve.high);
     }
     const auto solver = line.colPivHouseholderQr();
     const MatrixXd bent = slopes - line * solver.solve(slopes);
@@ -121,10 +124,13 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   const MatrixXd covariance = amplitudes.covariance.block(first, first, k, k);
   const double scale = observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
   const bool within = found.curve.x.size() == 0;
-  const double low = within ? 0 : found.curve.x.minCoeff();
-  const double high = within ? observations.duration_s.maxCoeff() : found.curve.x.maxCoeff();
-  std::vector<Drawn> points = result.levels ? drawn_levels(found.curve) : drawn_curve(found.curve, low, high);
-  if (!result.levels) take_out_baseline(observations, rows, found.curve, low, high, points);
+  const double duration_s = observations.duration_s.maxCoeff();
+  const Curve& curve = found.curve;
+  std::vector<Drawn> points =
+      result.levels ? drawn_levels(curve)
+      : within      ? drawn_curve(curve, 0, duration_s, 0, duration_s)
+                    : drawn_curve(curve, curve.x.minCoeff(), curve.x.maxCoeff(), curve.low, curve.high);
+  if (!result.levels) take_out_baseline(observations, rows, curve, points);
   double mean = 0;
   for (const Drawn& point : points) {
     const double value = scale * point.columns.dot(amplitude),

@@ -101,8 +101,7 @@ Refuted refuted(const Explanation& explanation) {
     result.terms.push_back(adopted.term);
     result.why.push_back(why);
   }
-  result.all = result.terms.empty() && refutable &&
-               worse(explanation.named_held_out_rmse, explanation.before.held_out_rmse);
+  result.all = result.terms.empty() && refutable && worse(explanation.sealed.all, explanation.sealed.curves);
   return result;
 }
 
@@ -112,8 +111,8 @@ std::string taken_back_all(const Explanation& explanation) {
     if (!adopted.term.effect->theory_only) names.push_back(adopted.term.label());
   return fmt::format(
       "{} found and taken back: the error of the sealed blocks is {:.4g} {} with {}, {:.4g} without",
-      fmt::join(names, ", "), explanation.named_held_out_rmse, explanation.unit,
-      names.size() > 1 ? "them" : "it", explanation.before.held_out_rmse);
+      fmt::join(names, ", "), explanation.sealed.all, explanation.unit, names.size() > 1 ? "them" : "it",
+      explanation.sealed.curves);
 }
 
 /// Once more without the names that are refuted: what they did may be structure whose cause is not known.
@@ -125,8 +124,8 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
     settings.taken_back.insert(settings.taken_back.end(), found.terms.begin(), found.terms.end());
     if (found.all) std::erase_if(effects, [](const Effect* effect) { return !effect->theory_only; });
     Explanation without = explain_once(observations, effects, settings);
-    const bool stay = worse(explanation.before.held_out_rmse, explanation.named_held_out_rmse) &&
-                      worse(without.named_held_out_rmse, explanation.named_held_out_rmse);
+    const bool stay = worse(explanation.sealed.curves, explanation.sealed.all) &&
+                      worse(without.sealed.names, explanation.sealed.all);
     if (found.all) said.push_back(taken_back_all(explanation));
     for (std::size_t k = 0; k < found.terms.size(); ++k)
       said.push_back(

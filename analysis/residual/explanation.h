@@ -18,6 +18,11 @@ struct ErrorEstimate {
   double held_out_low = 0, held_out_high = 0;
 };
 
+/// Errors of the sealed runs with parts of what was found: the names, the curves, both.
+struct SealedErrors {
+  double names = 0, curves = 0, all = 0;
+};
+
 struct ParameterEstimate {
   std::string name, unit;
   double value = 0, low = 0, high = 0;  // 95 %; of a time constant or length within its physical bounds
@@ -81,7 +86,7 @@ struct Explanation {
   double noise_floor = 0;
   int blocks = 0, runs = 0;
   ErrorEstimate before, after;
-  double named_held_out_rmse = 0;  // of what has a name; `after` may have curves in it
+  SealedErrors sealed;
   std::vector<AdoptedEffect> adopted;
   std::vector<UnknownStructure> unknown;
   std::vector<Untestable> untestable;

@@ -129,7 +129,15 @@ void warn_of_doubts(Explanation& explanation) {
       explanation.warnings.push_back(
           fmt::format("{}: the data alone do not tell its {} from 0", adopted.term.label(), amplitude.name));
   }
-  if (!explanation.adopted.empty() && explanation.after.held_out_rmse > explanation.before.held_out_rmse)
+  const bool worse = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
+  if (const SealedErrors& sealed = explanation.sealed;
+      worse && sealed.all < std::min(sealed.curves, explanation.before.held_out_rmse))
+    explanation.warnings.push_back(
+        fmt::format("on the sealed blocks the error is larger with the names alone than without; beside the "
+                    "curves they make it smaller ({:.4g}, without them {:.4g}): adopt them together "
+                    "(--adopt-empirical)",
+                    sealed.all, sealed.curves));
+  else if (worse)
     explanation.warnings.emplace_back(
         "on the sealed blocks the error is larger with what was adopted than without: doubt it");
   else if (explanation.after.held_out_low > kFarAboveFloor * explanation.noise_floor &&
@@ -222,9 +230,15 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
         "hold out others");
   set_interval(alone, before, settings.seed, explanation.before);
   set_interval(alone, after, settings.seed, explanation.after);
-  explanation.named_held_out_rmse = rms(score(wide, named, named.variances, seal.open, scored).error);
-  explanation.noise_floor =
-      rms(score(wide, found.final, found.final.variances, seal.open, scored).expected_std);
+  const HeldOutErrors whole = score(wide, found.final, found.final.variances, seal.open, scored);
+  explanation.sealed = {.names = rms(score(wide, named, named.variances, seal.open, scored).error),
+                        .curves = rms(before.error),
+                        .all = rms(whole.error)};
+  if (!found.curves.empty()) {
+    const JointFit curves = fit_jointly(alone, {.terms = {}, .curves = found.final.model.curves}, seal.open);
+    explanation.sealed.curves = rms(score(alone, curves, curves.variances, seal.open, scored).error);
+  }
+  explanation.noise_floor = rms(whole.expected_std);
   explanation.before.rmse = rms(residuals(alone, found.baseline, seal.open));
   explanation.after.rmse = rms(residuals(wide, shown, seal.open));
 }
