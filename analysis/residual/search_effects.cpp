@@ -46,9 +46,11 @@ void Search::add_effects() {
 bool Search::already_in(const Term& way, const MeanModel& model) {
   return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
     const bool another_axis = way.effect->name == "crosstalk" && term.effect != way.effect;
-    return !another_axis && term.effect->name == way.effect->name &&
-           (term.rotor == way.rotor || way.rotor < 0) && term.other == way.other &&
-           !way.effect->has_change_point();
+    const bool another_step =
+        way.effect->has_change_point() &&
+        !std::equal(way.parameters.begin() + 1, way.parameters.end(), term.parameters.begin() + 1);
+    return term.effect->name == way.effect->name && !another_axis && !another_step &&
+           (term.rotor == way.rotor || way.rotor < 0) && term.other == way.other;
   });
 }
 
