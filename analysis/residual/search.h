@@ -29,7 +29,7 @@ class Search {
     std::vector<CandidateFit> fits;
     std::unique_ptr<CandidateScan> scan;
     std::vector<std::size_t> order;            // by evidence, best first
-    std::map<std::size_t, Term> partner = {};  // of ways that are two steps: the second
+    std::map<std::size_t, Term> partner = {};  // of ways that are two effects: the second
   };
 
   struct CurveScan {
@@ -91,8 +91,10 @@ class Search {
   /// Of a term that is a step, counted from the newest (1): from the run on, of the sessions on either side,
   /// where it is likeliest.
   JointFit at_best_run(JointFit fit, std::size_t from_newest) const;
-  /// Two steps of two rotors at one run, of which neither can be seen alone: search_pairs.cpp
-  void add_pairs_of_steps(Scan& scan) const;
+  // two of which neither can be seen alone: search_pairs.cpp
+  static void add_pair(Scan& scan, std::size_t one, std::size_t two, double weight);
+  void add_pairs_of_steps(Scan& scan) const;  // of two rotors at one run
+  void add_pairs_of_axes(Scan& scan) const;   // of a table: crosstalk from both
   bool accept_pair(const Scan& scan, std::size_t i, double p);
   /// Whether a course that is straight or bends once over the order of runs does as well as the step.
   bool is_gradual(const std::vector<Term>& steps, const NullFit& variances,

@@ -283,7 +283,7 @@ void Search::set_detectable(const Scan& scan) {
   for (std::size_t i = 0; i < scan.candidates.size(); ++i) {
     const Term& way = scan.ways[i];
     const bool alike = way.rotor < 0 || way.effect->scope == EffectScope::kPair;
-    if (!alike || way.per_group) continue;
+    if (!alike || way.per_group || scan.partner.contains(i)) continue;
     const double z = std::sqrt(2 * scan.fits[i].likelihood_ratio);
     const double size = std::abs(scan.fits[i].amplitude(0)) * rms_of(scan.candidates[i].columns[0][0]);
     if (z > 0 && size > 0) errors[way.effect->name].emplace_back(size / z, i);

@@ -20,7 +20,12 @@ struct Search::InGroups {
 /// Only effects that may have either sign: of the others, what all groups have in common is seen first.
 Search::Scan Search::scan_effects_and_groups(const JointFit& base) const {
   Scan scan = list_effects(base);
-  observations_.channels() == 1 ? add_group_ways(scan) : add_pairs_of_steps(scan);
+  if (observations_.channels() == 1) {
+    add_group_ways(scan);
+    add_pairs_of_axes(scan);
+  } else {
+    add_pairs_of_steps(scan);
+  }
   rank(base, scan);
   return scan;
 }

@@ -1,11 +1,29 @@
-// Two steps of two rotors at one run. What rotors have in common scatters less than what they differ by, and
-// says of each of two opposite steps alone that there is none.
+// Two effects of one name of which neither may be seen alone. Two steps of two rotors at one run: what rotors
+// have in common scatters less than what they differ by, and says of each of two opposite steps that there is
+// none. Crosstalk from two axes: what the one does is scatter for the other.
 #include "analysis/residual/search.h"
 
 #include <algorithm>
 #include <utility>
 
 namespace tunnelrig {
+
+void Search::add_pair(Scan& scan, std::size_t one, std::size_t two, double weight) {
+  scan.partner[scan.ways.size()] = scan.ways[two];
+  scan.candidates.push_back({.columns = {scan.candidates[one].columns[0], scan.candidates[two].columns[0]},
+                             .sign = 0,
+                             .weight = weight * scan.candidates[one].weight});
+  scan.ways.push_back(scan.ways[one]);
+}
+
+void Search::add_pairs_of_axes(Scan& scan) const {
+  std::vector<std::size_t> axes;
+  for (std::size_t i = 0; i < scan.ways.size(); ++i)
+    if (scan.ways[i].effect->name == "crosstalk" && !scan.ways[i].per_group) axes.push_back(i);
+  const double pairs = static_cast<double>(axes.size() * (axes.size() - 1)) / 2;
+  for (std::size_t a = 0; a < axes.size(); ++a)
+    for (std::size_t b = a + 1; b < axes.size(); ++b) add_pair(scan, axes[a], axes[b], 1 / pairs);
+}
 
 void Search::add_pairs_of_steps(Scan& scan) const {
   constexpr double kWeight = 1. / 6;  // six pairs for four rotors, and rarer than one
@@ -26,11 +44,7 @@ void Search::add_pairs_of_steps(Scan& scan) const {
       if (!is_step(j) || one.effect != two.effect || one.rotor == two.rotor ||
           one.parameters != two.parameters)
         continue;
-      scan.partner[scan.ways.size()] = two;
-      scan.candidates.push_back({.columns = {scan.candidates[i].columns[0], scan.candidates[j].columns[0]},
-                                 .sign = 0,
-                                 .weight = kWeight * scan.candidates[i].weight});
-      scan.ways.push_back(one);
+      add_pair(scan, i, j, kWeight);
     }
 }
 
@@ -59,7 +73,8 @@ bool Search::accept_pair(const Scan& scan, std::size_t i, double p) {
   };
   const CrossValidation before = errors_of(fit_), after = errors_of(both);
   const LossDifference gain = compare(before, after);
-  if (!(gain.mean > gain.standard_error) || is_gradual({one, two}, both.variances, after)) return false;
+  if (!(gain.mean > gain.standard_error)) return false;
+  if (one.effect->has_change_point() && is_gradual({one, two}, both.variances, after)) return false;
   fit_ = at_best_run(at_best_run(std::move(both), 1), 2);
   const auto terms = fit_.model.terms.end();
   for (const auto& term : {*(terms - 2), *(terms - 1)})

@@ -83,5 +83,27 @@ TEST_F(TableSourceTest, AForceLeaksIntoAMoment) {
   EXPECT_EQ(effects.all.back()->parameters[0].unit, "N·m/N");
 }
 
+/// As large as each other, so that beside one that is not in the model the other is no more than scatter.
+TEST_F(TableSourceTest, TwoAxesThatHideEachOtherAreBothFound) {
+  std::string csv = "axis,fx,fy,fz,y\n", schema = "groups = [\"axis\"]\n";
+  for (const char axis : {'x', 'y', 'z'}) {
+    for (const double load : {0.0, 1.5, 3.0, 6.0, 9.0}) {
+      const double fx = axis == 'x' ? load : 0, fy = axis == 'y' ? load : 0, fz = axis == 'z' ? load : 0;
+      csv += fmt::format("{},{},{},{},{}\n", axis, fx, fy, fz,
+                         fy + 0.02 * fx - 0.02 * fz + 0.001 * scatter(random));
+    }
+  }
+  schema += "[response]\ncolumn = \"y\"\nunit = \"V\"\n";
+  for (const char axis : {'x', 'y', 'z'})
+    schema += fmt::format("[[covariates]]\ncolumn = \"f{}\"\nunit = \"N\"\n", axis);
+  const Observations o = observed(csv, schema, "linear:fy");
+  const TableEffects effects(o, test::every_effect());
+  const Explanation e = explain(o, effects.all, test::quick());
+  ASSERT_EQ(names(e), "crosstalk crosstalk ");
+  for (const AdoptedEffect& adopted : e.adopted)
+    EXPECT_NEAR(adopted.parameters[0].value, adopted.term.effect->form == "fx" ? 0.02 : -0.02, 0.001);
+  EXPECT_LT(e.after.held_out_rmse, 0.1 * e.before.held_out_rmse);
+}
+
 }  // namespace
 }  // namespace tunnelrig
