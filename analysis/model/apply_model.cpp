@@ -188,7 +188,7 @@ class Forward {
     for (std::size_t k = 0; k < model_.curves.size(); ++k) {
       const ModelCurve& curve = model_.curves[k];
       if (curve.rotor >= 0 && channel != curve.rotor) continue;
-      const double x = std::clamp(condition(k, row, channel), curve.low, curve.high);
+      const double x = condition(k, row, channel);
       double weight = curve_places_[k] == nullptr ? 1 : curve_places_[k]->weight(row);
       if (curve.times) weight = curve.times->strength.at(curve_times_[k]->at(row, channel));
       const double mean = curve.times ? curve.times->mean : 0;

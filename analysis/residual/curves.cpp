@@ -276,6 +276,8 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
   for (const Covariate& covariate : observations.covariates) {
     if (!can_be_followed(observations, covariate) || number_of_texts(observations, covariate) != nullptr)
       continue;
+    const auto [low, high] = range_of(covariate, rows);
+    if (!(high > low)) continue;
     if (const std::vector<double> levels = levels_of(observations, covariate, rows); !levels.empty()) {
       const auto column_at = [&](int k, double x) { return level_column(levels, k, x); };
       for (const int rotor : rotors)
@@ -285,6 +287,8 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
                           .columns = columns_over(observations, covariate, rotor,
                                                   static_cast<int>(levels.size()) - 1, column_at),
                           .x = covariate.value,
+                          .low = low,
+                          .high = high,
                           .levels = levels,
                           .labels = covariate.labels});
     }
@@ -292,8 +296,6 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
     if (covariate.derived && covariate.name == "hour_of_day" && repeats_another(observations, covariate))
       continue;
     const int most = places_on_range(covariate, rows) / 3;
-    const auto [low, high] = range_of(covariate, rows);
-    if (!(high > low)) continue;
     const auto add = [&, low = low, high = high](CurveShape shape, int count, const Place& place = {}) {
       const auto column_at = [&](int k, double x) { return curve_column(shape, k, x, low, high); };
       for (const int rotor : rotors) {
