@@ -128,7 +128,7 @@ parameters = [
 
 /// The truth is a wave of period 0.35 that no candidate of the program has.
 TEST_F(ExplanationPage, AnEffectOfOnesOwnIsFound) {
-  campaign("c", {.track = Track::kOutside, .size = 2, .effects = {"humidity_wave"}, .seed = kSeed});
+  campaign("c", {.track = Track::kOutside, .size = 4, .effects = {"humidity_wave"}, .seed = kSeed});
   EXPECT_EQ(explain("c")["verdict"], "unknown");
   write_text(folder / "own.toml", kWave);
   const json found = explain("c", "--effects own.toml");
