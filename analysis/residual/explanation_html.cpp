@@ -48,7 +48,7 @@ class Page {
         rows_(observations_.all_rows()),
         before_(-explanation.residual_before),
         after_(-explanation.residual_after) {
-    predicted_ = predict_response(observations_, explanation.model, rows_);
+    forces_ = predict_forces(observations_, explanation.model, rows_);
   }
 
   Json runs() const {
@@ -69,7 +69,7 @@ class Page {
   /// Each covariate of each effect and each structure without a name.
   Json panels() const {
     Json list = Json::array();
-    for (const AdoptedEffect& adopted : explanation_.adopted) add_effect(adopted, list);
+    for (std::size_t t = 0; t < explanation_.adopted.size(); ++t) add_effect(t, list);
     for (const UnknownStructure& unknown : explanation_.unknown) add_unknown(unknown, list);
     return list;
   }
@@ -178,9 +178,11 @@ class Page {
     return json;
   }
 
-  /// n × c on the scale of y; where each group has its own amplitude, by that group's.
-  MatrixXd added_by(const AdoptedEffect& adopted) const {
-    const TermResponse response = respond(adopted.term, observations_, predicted_);
+  /// What the t-th effect does, n × c on the scale of y; where each group has its own amplitude, by that
+  /// group's.
+  MatrixXd added_by(std::size_t t) const {
+    const AdoptedEffect& adopted = explanation_.adopted[t];
+    const TermResponse response = respond(adopted.term, observations_, forces_.acted_on[t]);
     if (!adopted.term.per_group) return response.value[0];
     MatrixXd added = response.derivative[0][0];
     for (const int row : rows_) {
@@ -194,10 +196,11 @@ class Page {
     return added;
   }
 
-  void add_effect(const AdoptedEffect& adopted, Json& list) const {
-    const MatrixXd added = visible(added_by(adopted));
+  void add_effect(std::size_t t, Json& list) const {
+    const AdoptedEffect& adopted = explanation_.adopted[t];
+    const MatrixXd added = visible(added_by(t));
     const MatrixXd fitted =
-        observations_.multiplicative ? MatrixXd(added.array() * predicted_.array()) : added;
+        observations_.multiplicative ? MatrixXd(added.array() * forces_.predicted.array()) : added;
     std::vector<std::string> names = adopted.term.effect->covariates;
     if (names.empty()) names = {"run_order"};
     for (const std::string& name : names) {
@@ -254,8 +257,8 @@ class Page {
   Json course(const std::string& label, int rotor) const {
     Components modelled(1 + observations_.shape.size(),
                         MatrixXd::Zero(observations_.rows(), observations_.channels()));
-    for (const Term& term : explanation_.model.terms) {
-      const TermResponse response = respond(term, observations_, predicted_);
+    for (std::size_t t = 0; t < forces_.acted_on.size(); ++t) {
+      const TermResponse response = respond(explanation_.model.terms[t], observations_, forces_.acted_on[t]);
       for (std::size_t k = 0; k < modelled.size(); ++k) modelled[k] += response.value[k];
     }
     Json json{{"label", label},
@@ -291,7 +294,8 @@ class Page {
   const Explanation& explanation_;
   const Observations observations_;
   std::vector<int> rows_;
-  MatrixXd before_, after_, predicted_;  // measured less predicted; forces
+  MatrixXd before_, after_;  // measured less predicted
+  Forces forces_;
 };
 
 Json effects_of(const Explanation& explanation) {

@@ -20,8 +20,7 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
   };
   // Effects of each group's own are the last of the baseline's slopes, in their order.
   const Index column = observations.slopes.cols() - own_amplitudes(model.terms.size()) + own_amplitudes(t);
-  const Components offset =
-      linearise(observations, model, predict_response(observations, model, rows)).offset;
+  const Components offset = linearise(observations, model, predict_forces(observations, model, rows)).offset;
   std::map<int, std::vector<int>> groups;
   for (const int row : rows) groups[observations.group[static_cast<std::size_t>(row)]].push_back(row);
   std::vector<GroupEstimate> result;

@@ -82,12 +82,12 @@ class Whitener {
 class Residuals : public ceres::CostFunction {
  public:
   Residuals(const Observations& observations, const MeanModel& start, const Whitener& whitener,
-            const MatrixXd& predicted)
+            const Forces& forces)
       : observations_(observations),
         model_(start),
         free_(free_parameters(start)),
         whitener_(whitener),
-        predicted_(predicted) {
+        forces_(forces) {
     const Components y = response_components(observations);
     y_ = whitener_({&y}).col(0);
     set_num_residuals(static_cast<int>(y_.size()));
@@ -98,7 +98,7 @@ class Residuals : public ceres::CostFunction {
     MeanModel model = model_;
     for (std::size_t i = 0; i < free_.size(); ++i)
       model.terms[free_[i].term].parameters[free_[i].parameter] = parameters[0][i];
-    const LinearModel linear = linearise(observations_, {model.terms, {}}, predicted_);
+    const LinearModel linear = linearise(observations_, {model.terms, {}}, forces_);
     std::vector<const Components*> items = {&linear.offset};
     for (const Components& column : linear.columns) items.push_back(&column);
     const MatrixXd whitened = whitener_(items);
@@ -116,12 +116,12 @@ class Residuals : public ceres::CostFunction {
   MeanModel model_;
   std::vector<FreeParameter> free_;
   const Whitener& whitener_;
-  const MatrixXd& predicted_;
+  const Forces& forces_;
   VectorXd y_;
 };
 
 bool solve(const Observations& observations, MeanModel& model, const Whitener& whitener,
-           const MatrixXd& predicted) {
+           const Forces& forces) {
   const std::vector<FreeParameter> free = free_parameters(model);
   if (free.empty()) return true;
   std::vector<double> values;
@@ -130,7 +130,7 @@ bool solve(const Observations& observations, MeanModel& model, const Whitener& w
     const EffectParameter& parameter = model.terms[free[i].term].effect->parameters[free[i].parameter];
     values[i] = std::clamp(values[i], parameter.lower, parameter.upper);
   }
-  auto residuals = std::make_unique<Residuals>(observations, model, whitener, predicted);
+  auto residuals = std::make_unique<Residuals>(observations, model, whitener, forces);
   VectorXd at_start(residuals->num_residuals());
   const double* start = values.data();
   // Ceres would say on standard error that it cannot begin where a force changes its sign.
@@ -152,6 +152,20 @@ bool solve(const Observations& observations, MeanModel& model, const Whitener& w
   for (std::size_t i = 0; i < free.size(); ++i)
     model.terms[free[i].term].parameters[free[i].parameter] = values[i];
   return summary.IsSolutionUsable();
+}
+
+constexpr int kMostRounds = 8;  // of forces and parameters in turns
+
+/// Whether a round has left the parameters where they were, as far as anybody reads them.
+bool has_settled(const MeanModel& before, const MeanModel& after) {
+  constexpr double kLittle = 1e-3;
+  const std::vector<FreeParameter> free = free_parameters(after);
+  return std::all_of(free.begin(), free.end(), [&](const FreeParameter& f) {
+    const EffectParameter& parameter = after.terms[f.term].effect->parameters[f.parameter];
+    const double value = after.terms[f.term].parameters[f.parameter];
+    const double size = std::max(std::abs(value), kLittle * (parameter.upper - parameter.lower));
+    return std::abs(value - before.terms[f.term].parameters[f.parameter]) <= kLittle * size;
+  });
 }
 
 }  // namespace
@@ -198,20 +212,10 @@ MatrixXd along_slopes(const Observations& observations, const MatrixXd& residual
   return result;
 }
 
-}  // namespace
-
-MatrixXd predict_response(const Observations& observations, const MeanModel& model,
-                          const std::vector<int>& rows) {
-  MatrixXd residual = observations.y;
-  MatrixXd added = MatrixXd::Zero(residual.rows(), residual.cols());
-  if (!model.terms.empty()) {
-    const MatrixXd nominal = predict_response(observations, {}, rows);
-    for (const Term& term : model.terms) {
-      const MatrixXd value = respond(term, observations, nominal).value[0];
-      residual -= value;
-      if (!term.effect->needs_previous) added += value;
-    }
-  }
+/// Group constants and slopes fitted to what is left, `residual`, with `added` on top: in the response's
+/// unit.
+MatrixXd on_baseline(const Observations& observations, const MatrixXd& residual, MatrixXd added,
+                     const std::vector<int>& rows) {
   MatrixXd sum = MatrixXd::Zero(observations.groups(), residual.cols());
   VectorXd count = VectorXd::Zero(observations.groups());
   for (const int row : rows) {
@@ -234,13 +238,50 @@ MatrixXd predict_response(const Observations& observations, const MeanModel& mod
   return predicted;
 }
 
-LinearModel linearise(const Observations& observations, const MeanModel& model, const MatrixXd& predicted) {
+}  // namespace
+
+/// The baseline is what is left without the effects, and they act on what the baseline makes: found in turns.
+Forces predict_forces(const Observations& observations, const MeanModel& model,
+                      const std::vector<int>& rows) {
+  constexpr int kMostTurns = 10;
+  constexpr double kSettled = 1e-6;
+  const MatrixXd none = MatrixXd::Zero(observations.rows(), observations.channels());
+  Forces forces{on_baseline(observations, observations.y, none, rows), {}};
+  forces.acted_on.assign(model.terms.size(), forces.predicted);
+  for (int turn = 0; turn < kMostTurns && !model.terms.empty(); ++turn) {
+    MatrixXd residual = observations.y, added = none;
+    std::vector<MatrixXd> own(model.terms.size(), none);
+    for (std::size_t t = 0; t < model.terms.size(); ++t) {
+      const MatrixXd value = respond(model.terms[t], observations, forces.acted_on[t]).value[0];
+      residual -= value;
+      if (!model.terms[t].effect->needs_previous) own[t] = value;
+      added += own[t];
+    }
+    MatrixXd predicted = on_baseline(observations, residual, added, rows);
+    if (!predicted.allFinite()) break;  // a force that has changed its sign has no logarithm
+    for (std::size_t t = 0; t < own.size(); ++t)
+      forces.acted_on[t] = observations.multiplicative ? MatrixXd(predicted.array() / own[t].array().exp())
+                                                       : MatrixXd(predicted - own[t]);
+    const double change = (predicted - forces.predicted).cwiseAbs().maxCoeff();
+    forces.predicted = std::move(predicted);
+    if (change <= kSettled * forces.predicted.cwiseAbs().maxCoeff()) break;
+  }
+  return forces;
+}
+
+MatrixXd predict_response(const Observations& observations, const MeanModel& model,
+                          const std::vector<int>& rows) {
+  return predict_forces(observations, model, rows).predicted;
+}
+
+LinearModel linearise(const Observations& observations, const MeanModel& model, const Forces& forces) {
   LinearModel linear{
       Components(1 + observations.shape.size(), MatrixXd::Zero(observations.rows(), observations.channels())),
       {}};
-  for (const Term& term : model.terms) {
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    const Term& term = model.terms[t];
     if (term.per_group) continue;  // a part of the baseline (Observations::slopes)
-    TermResponse response = respond(term, observations, predicted);
+    TermResponse response = respond(term, observations, forces.acted_on[t]);
     for (std::size_t k = 0; k < linear.offset.size(); ++k) linear.offset[k] += response.value[k];
     for (std::size_t k = 0; k < response.derivative.size(); ++k)
       if (is_free(term, k)) linear.columns.push_back(std::move(response.derivative[k]));
@@ -255,7 +296,11 @@ MeanModel refit(const Observations& observations, const MeanModel& start, const 
   MeanModel model = start;
   const MixedModel mixed(observations, rows, variances.ratio);
   const Whitener whitener(mixed, variances, model.curves);
-  solve(observations, model, whitener, predict_response(observations, model, rows));
+  for (int round = 0; round < kMostRounds; ++round) {
+    const MeanModel before = model;
+    solve(observations, model, whitener, predict_forces(observations, model, rows));
+    if (has_settled(before, model)) break;
+  }
   return model;
 }
 
@@ -268,16 +313,18 @@ JointFit fit_jointly(const Observations& observations, const MeanModel& start, c
   JointFit fit{.model = start, .linear = {}, .variances = {}, .at_bound = {}};
   const MixedModel mixed(observations, rows);
   const Components y = response_components(observations);
-  // Variances depend on the mean and the mean on the variances: twice round is enough, since both move
-  // little.
-  for (int round = 0; round < 2; ++round) {
-    const MatrixXd predicted = predict_response(observations, fit.model, rows);
-    fit.linear = linearise(observations, fit.model, predicted);
+  // Variances depend on the mean and the mean on the variances: twice round is enough for them, since both
+  // move little. Forces depend on the mean as well, and large effects on the forces.
+  for (int round = 0; round < kMostRounds; ++round) {
+    const Forces forces = predict_forces(observations, fit.model, rows);
+    fit.linear = linearise(observations, fit.model, forces);
     fit.variances = CandidateScan(mixed, fit.linear.columns, {}).null_fit(difference(y, fit.linear.offset));
     const Whitener whitener(mixed, fit.variances, fit.model.curves);
-    fit.converged = solve(observations, fit.model, whitener, predicted);
+    const MeanModel before = fit.model;
+    fit.converged = solve(observations, fit.model, whitener, forces);
+    if (round > 0 && has_settled(before, fit.model)) break;
   }
-  fit.linear = linearise(observations, fit.model, predict_response(observations, fit.model, rows));
+  fit.linear = linearise(observations, fit.model, predict_forces(observations, fit.model, rows));
   fit.variances = CandidateScan(mixed, fit.linear.columns, {}).null_fit(difference(y, fit.linear.offset));
   for (const FreeParameter& f : free_parameters(fit.model)) {
     const EffectParameter& parameter = fit.model.terms[f.term].effect->parameters[f.parameter];

@@ -22,9 +22,18 @@ struct LinearModel {
   std::vector<Components> columns;  // derivatives by the terms' free parameters, then the curves' columns
 };
 
-/// Force (response) that baseline and terms predict, n × c: group constants and slopes fitted to `rows`; with
-/// a linear baseline without its zero, which is no force. Effects of the run before are in what is fitted but
-/// not in the forces: it is loads that a cell remembers, not what it made of them.
+/// Forces (responses), n × c each.
+struct Forces {
+  /// Of baseline and terms: group constants and slopes fitted to some rows; with a linear baseline without
+  /// its zero, which is no force. Effects of the run before are in what is fitted but not in here: it is
+  /// loads that a cell remembers, not what it made of them.
+  Eigen::MatrixXd predicted;
+  /// By term: what it acts on, the same without what the term itself adds.
+  std::vector<Eigen::MatrixXd> acted_on;
+};
+Forces predict_forces(const Observations& observations, const MeanModel& model, const std::vector<int>& rows);
+
+/// The predicted ones alone.
 Eigen::MatrixXd predict_response(const Observations& observations, const MeanModel& model,
                                  const std::vector<int>& rows);
 
@@ -34,8 +43,7 @@ Components difference(const Components& a, const Components& b);
 /// y less columns times their amplitudes.
 Components without(Components y, const std::vector<Components>& columns, const Eigen::VectorXd& amplitude);
 
-LinearModel linearise(const Observations& observations, const MeanModel& model,
-                      const Eigen::MatrixXd& predicted);
+LinearModel linearise(const Observations& observations, const MeanModel& model, const Forces& forces);
 
 struct JointFit {
   MeanModel model;

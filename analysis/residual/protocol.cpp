@@ -46,7 +46,7 @@ JointFit without_curves(const Attribution& found, const std::vector<int>& rows) 
   JointFit fit = found.final;
   fit.model.curves.clear();
   const Observations& observations = found.observations;
-  fit.linear = linearise(observations, fit.model, predict_response(observations, fit.model, rows));
+  fit.linear = linearise(observations, fit.model, predict_forces(observations, fit.model, rows));
   fit.linear.columns.clear();
   fit.variances = CandidateScan(MixedModel(observations, rows), {}, {})
                       .null_fit(difference(response_components(observations), fit.linear.offset));

@@ -126,6 +126,38 @@ TEST_F(JointFitTest, ACurveTakesWhatTheTermsLeave) {
   EXPECT_NEAR(fit.model.terms[0].parameters[0], 0.05, 0.003);
 }
 
+/// What an effect acts on is without its own doing, however large that is.
+TEST_F(JointFitTest, LargeEffectsAreOfTheirSize) {
+  Observations o = observations(1, 0, 2e-4);
+  test::add_effect(o, "mounting_step", {1.5, 56});  // on forces of 7 N
+  const JointFit fit = fit_jointly(o, {{term("mounting_step", {0.5, 56})}, {}}, o.all_rows());
+  const auto estimates = estimate_parameters(o, fit, o.all_rows());
+  EXPECT_NEAR(fit.model.terms[0].parameters[0], 1.5, 4 * estimates[0][0].standard_error);
+  EXPECT_LT(estimates[0][0].standard_error, 0.005);
+  EXPECT_NEAR(fit.variances.sigma[0], 2e-4, 5e-5);
+}
+
+/// Nor is the line that it bends.
+TEST_F(JointFitTest, ALineAndWhatBendsItAreFoundTogether) {
+  Observations o = test::simulate({.runs_of_block = std::vector<int>(14, 8),
+                                   .groups = 1,
+                                   .sigma = 0.02,
+                                   .session_ratio = 0,
+                                   .multiplicative = false},
+                                  random);
+  test::add_covariate(o, "throttle", -1, 1, random);
+  o.slopes = o.find("throttle")->value;
+  const MatrixXd line = 8 * o.slopes;
+  const MatrixXd noise = o.y.array() - o.y.mean();
+  test::set_y(o, line);
+  test::add_effect(o, "bidirectional", {-0.25});
+  test::set_y(o, o.y + noise);
+  const JointFit fit = fit_jointly(o, {{term("bidirectional", {-0.1})}, {}}, o.all_rows());
+  const auto estimates = estimate_parameters(o, fit, o.all_rows());
+  EXPECT_NEAR(fit.model.terms[0].parameters[0], -0.25, 4 * estimates[0][0].standard_error);
+  EXPECT_LT(estimates[0][0].standard_error, 0.01);
+}
+
 TEST_F(JointFitTest, RefitFollowsTheRuns) {
   Observations o = observations(1, 0, 2e-4);
   test::add_effect(o, "creep", {0.04, 90});
