@@ -101,7 +101,8 @@ Refuted refuted(const Explanation& explanation) {
     result.terms.push_back(adopted.term);
     result.why.push_back(why);
   }
-  result.all = result.terms.empty() && refutable && worse(explanation.sealed.all, explanation.sealed.curves);
+  result.all = result.terms.empty() && refutable &&
+               worse(explanation.sealed.all, explanation.sealed.curves) && explanation.sealed.against_names;
   return result;
 }
 

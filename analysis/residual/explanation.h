@@ -21,6 +21,8 @@ struct ErrorEstimate {
 /// Errors of the sealed runs with parts of what was found: the names, the curves, both.
 struct SealedErrors {
   double names = 0, curves = 0, all = 0;
+  /// Whether they speak against the names beside the curves, and against what was adopted.
+  bool against_names = false, against_adopted = false;
 };
 
 struct ParameterEstimate {

@@ -34,6 +34,16 @@ double rms(const MatrixXd& errors) {
   return count == 0 ? 0 : std::sqrt(missing.select(0, errors).squaredNorm() / static_cast<double>(count));
 }
 
+/// Whether the sealed runs speak against a model: they are predicted clearly worse than without it, and worse
+/// than it expects of itself. Where an effect does little in them (they lie at its reference) it is chance
+/// whether the error grows.
+bool speak_against(const HeldOutErrors& with, const HeldOutErrors& without) {
+  constexpr double kClearly = 2;  // standard errors, by runs
+  const MatrixXd squares = with.error.array().square() - without.error.array().square();
+  const VectorXd of_runs = squares.array().isNaN().select(0, squares).rowwise().sum();
+  return of_runs.sum() > kClearly * of_runs.norm() && rms(with.error) > rms(with.expected_std);
+}
+
 HeldOutErrors score(const Observations& observations, const JointFit& fit, const NullFit& variances,
                     const std::vector<int>& fit_rows, const std::vector<int>& test_rows) {
   const Components y = difference(response_components(observations), fit.linear.offset);
@@ -137,9 +147,13 @@ void warn_of_doubts(Explanation& explanation) {
                     "curves they make it smaller ({:.4g}, without them {:.4g}): adopt them together "
                     "(--adopt-empirical)",
                     sealed.all, sealed.curves));
-  else if (worse)
+  else if (worse && explanation.sealed.against_adopted)
     explanation.warnings.emplace_back(
         "on the sealed blocks the error is larger with what was adopted than without: doubt it");
+  else if (worse)
+    explanation.warnings.emplace_back(
+        "on the sealed blocks what was adopted does little: that the error is larger with it than without is "
+        "chance, and says neither that it is right nor that it is wrong");
   else if (explanation.after.held_out_low > kFarAboveFloor * explanation.noise_floor &&
            explanation.noise_floor > 0)
     explanation.warnings.push_back(
@@ -231,13 +245,16 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
   set_interval(alone, before, settings.seed, explanation.before);
   set_interval(alone, after, settings.seed, explanation.after);
   const HeldOutErrors whole = score(wide, found.final, found.final.variances, seal.open, scored);
-  explanation.sealed = {.names = rms(score(wide, named, named.variances, seal.open, scored).error),
-                        .curves = rms(before.error),
-                        .all = rms(whole.error)};
+  HeldOutErrors curves = before;
   if (!found.curves.empty()) {
-    const JointFit curves = fit_jointly(alone, {.terms = {}, .curves = found.final.model.curves}, seal.open);
-    explanation.sealed.curves = rms(score(alone, curves, curves.variances, seal.open, scored).error);
+    const JointFit fit = fit_jointly(alone, {.terms = {}, .curves = found.final.model.curves}, seal.open);
+    curves = score(alone, fit, fit.variances, seal.open, scored);
   }
+  explanation.sealed = {.names = rms(score(wide, named, named.variances, seal.open, scored).error),
+                        .curves = rms(curves.error),
+                        .all = rms(whole.error),
+                        .against_names = speak_against(whole, curves),
+                        .against_adopted = speak_against(after, before)};
   explanation.noise_floor = rms(whole.expected_std);
   explanation.before.rmse = rms(residuals(alone, found.baseline, seal.open));
   explanation.after.rmse = rms(residuals(wide, shown, seal.open));

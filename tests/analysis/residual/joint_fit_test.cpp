@@ -129,6 +129,7 @@ TEST_F(JointFitTest, ACurveTakesWhatTheTermsLeave) {
 /// What an effect acts on is without its own doing, however large that is.
 TEST_F(JointFitTest, LargeEffectsAreOfTheirSize) {
   Observations o = observations(1, 0, 2e-4);
+  o.covariates.push_back({"run_order", Eigen::VectorXd::LinSpaced(o.rows(), 0, 111), true});
   test::add_effect(o, "mounting_step", {1.5, 56});  // on forces of 7 N
   const JointFit fit = fit_jointly(o, {{term("mounting_step", {0.5, 56})}, {}}, o.all_rows());
   const auto estimates = estimate_parameters(o, fit, o.all_rows());

@@ -76,6 +76,30 @@ TEST_F(Refuted, ANameOfWhichLittleIsKnownStaysWhereTheSealedBlocksNeedIt) {
   EXPECT_THAT(e.warnings, Contains(HasSubstr("crosstalk (fx) stays, ")));
 }
 
+/// Rows held out at the reference, where the effect does nothing: whether it makes their error larger is
+/// chance.
+TEST_F(Refuted, RowsInWhichAnEffectDoesNothingSpeakNeitherForItNorAgainstIt) {
+  int larger = 0, doubted = 0;
+  for (int table = 0; table < 10; ++table) {
+    std::string csv = "b,V,y\n";
+    for (int r = 0; r < 64; ++r) {
+      const double volts = r % 32 < 8 ? test::kMiddle_V : 10.5 + 2 * (r % 8 + even(random)) / 8;
+      const double force_N = 8 * std::pow(volts / test::kMiddle_V, 0.15) * (1 + 0.003 * scatter(random));
+      csv += fmt::format("{},{},{}\n", r / 8, volts, force_N);
+    }
+    const Explanation e =
+        explained(observed(csv,
+                           "blocks = \"b\"\nhold_out = \"V == 11.5\"\n"
+                           "[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+                           "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n"));
+    EXPECT_EQ(names(e), "supply_voltage ") << explanation_text(e);
+    doubted += testing::Value(e.warnings, Contains(HasSubstr("doubt it")));
+    larger += e.after.held_out_rmse > e.before.held_out_rmse;
+  }
+  EXPECT_GE(larger, 1);
+  EXPECT_LE(doubted, 2);  // one of forty is beyond two standard errors
+}
+
 /// A battery's name beside its voltage says nothing more.
 TEST_F(Refuted, TextsThatStandForNumbersDoNotTakeTheirName) {
   const std::vector<double> volts = {10, 11.2, 12.1, 13.4, 14.8};
