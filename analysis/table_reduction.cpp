@@ -34,6 +34,7 @@ std::optional<double> coefficient(const Observation& row, const std::string& mea
     return convert_coefficient(row.response, convention_of_response(meaning), convention, single_rotor(1));
   if (!row.speed_rpm || *row.speed_rpm <= 0 || !row.diameter_m) return {};
   const double density = dry_air_density_kg_m3(row.air_pressure_Pa, row.air_temperature_C + kZeroCelsius_K);
+  if (std::isnan(density)) return {};
   const double propeller = propeller_coefficient(row.response, density, *row.speed_rpm, *row.diameter_m);
   return convert_coefficient(propeller, Convention::kPropeller, convention, single_rotor(*row.diameter_m));
 }

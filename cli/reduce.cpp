@@ -163,7 +163,7 @@ int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
                      pulls));
   }
   if (reduction.unknown > 0) {
-    warn(fmt::format("{} rows are left out: their speed or propeller diameter is not known",
+    warn(fmt::format("{} rows are left out: their speed, air or propeller diameter is not known",
                      reduction.unknown));
   }
   return reduction.unknown > 0 ? kProblemFound : kWell;

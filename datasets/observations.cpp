@@ -4,6 +4,8 @@
 #include "datasets/meanings.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include <nlohmann/json.hpp>
 
@@ -31,6 +33,14 @@ std::optional<double> converted(const Sheet& sheet, std::size_t row, const Table
   return si;
 }
 
+constexpr double kNotRead = std::numeric_limits<double>::quiet_NaN();
+
+/// A column without any number is as good as none: all rows have what the schema says.
+void assume_where_none_was_read(double Observation::*air, double assumed, std::vector<Observation>& rows) {
+  if (std::ranges::all_of(rows, [&](const Observation& row) { return std::isnan(row.*air); }))
+    for (Observation& row : rows) row.*air = assumed;
+}
+
 Observation read_row(const Sheet& sheet, std::size_t row, const TableSchema& schema) {
   Observation observation{.place = sheet.place(row),
                           .group = {},
@@ -51,10 +61,10 @@ Observation read_row(const Sheet& sheet, std::size_t row, const TableSchema& sch
   for (const TableColumn& column : schema.covariates) {
     if (column.unit == kTextUnit) continue;
     const auto value = converted(sheet, row, column);
+    if (column.meaning == "air_temperature_C") observation.air_temperature_C = value.value_or(kNotRead);
+    if (column.meaning == "air_pressure_Pa") observation.air_pressure_Pa = value.value_or(kNotRead);
     if (!value) continue;
     if (column.column == schema.speed_column) observation.speed_rpm = *value * schema.speed_factor;
-    if (column.meaning == "air_temperature_C") observation.air_temperature_C = *value;
-    if (column.meaning == "air_pressure_Pa") observation.air_pressure_Pa = *value;
   }
   return observation;
 }
@@ -116,6 +126,8 @@ ObservationTable read_observations(const Sheet& sheet, const TableSchema& schema
   ObservationTable table{.schema = schema, .sheet = sheet, .rows = {}};
   for (std::size_t row = 0; row < sheet.rows.size(); ++row)
     table.rows.push_back(read_row(sheet, row, schema));
+  assume_where_none_was_read(&Observation::air_temperature_C, schema.air_temperature_C, table.rows);
+  assume_where_none_was_read(&Observation::air_pressure_Pa, schema.air_pressure_Pa, table.rows);
   return table;
 }
 

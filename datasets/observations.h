@@ -68,7 +68,7 @@ struct Observation {
   double response = 0;
   std::optional<double> speed_rpm;
   std::optional<double> diameter_m;
-  double air_temperature_C = 15;
+  double air_temperature_C = 15;  // NaN: left empty in a column that others have filled
   double air_pressure_Pa = 101325;
 };
 

@@ -1,6 +1,7 @@
 #include "analysis/residual/table_source.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 
@@ -51,7 +52,7 @@ TableSource used_rows(const ObservationTable& table, const ObservationChoice& ch
     highest[row.group] = std::max(highest[row.group], row.speed_rpm.value_or(0));
   const bool reduced = is_reduced(table, choice);
   TableSource source{table, {}};
-  int resting = 0, without_speed = 0;
+  int resting = 0, without_speed = 0, without_air = 0;
   for (std::size_t r = 0; r < table.rows.size(); ++r) {
     const Observation& row = table.rows[r];
     const double fastest = highest[row.group];
@@ -59,12 +60,17 @@ TableSource used_rows(const ObservationTable& table, const ObservationChoice& ch
       ++without_speed;
     else if (row.speed_rpm && fastest > 0 && *row.speed_rpm <= kAtRest * fastest)
       ++resting;
+    else if (reduced && (std::isnan(row.air_temperature_C) || std::isnan(row.air_pressure_Pa)))
+      ++without_air;
     else
       source.rows.push_back(r);
   }
   if (resting > 0) result.left_out.push_back(fmt::format("{} rows: the motor stood", resting));
   if (without_speed > 0)
     result.left_out.push_back(fmt::format("{} rows: no speed was read, so they have no C_T", without_speed));
+  if (without_air > 0)
+    result.left_out.push_back(fmt::format(
+        "{} rows: the temperature or the pressure of the air is empty, so they have no C_T", without_air));
   return source;
 }
 

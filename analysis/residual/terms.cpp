@@ -262,6 +262,9 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason =
         "only a table's thrust, coefficient, power or torque is held against a baseline without the density "
         "of its air";
+  if (effect.name == "air_pressure" && observations.from_table && observations.coefficient &&
+      !observations.of_air)
+    result.reason = "the pressure is in the density that thrusts are divided by";
   if (effect.scope == EffectScope::kPair && observations.channels() < 2)
     result.reason = "the response has one channel";
   if (effect.tunnel_only &&

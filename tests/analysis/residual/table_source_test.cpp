@@ -9,6 +9,7 @@
 namespace tunnelrig {
 namespace {
 
+using test::effect_named;
 using test::explained;
 using test::TablesTest;
 using testing::Contains;
@@ -60,6 +61,27 @@ TEST_F(TableSourceTest, RowsWithoutASpeedHaveNoC_TAndAreSaid) {
   EXPECT_THAT(o.left_out,
               ElementsAre("1 rows: the motor stood", "10 rows: no speed was read, so they have no C_T"));
   EXPECT_EQ(observed(csv, schema).rows(), 106);  // they do have a thrust
+}
+
+/// The density that C_T is made with has the pressure; it is not sought again.
+TEST_F(TableSourceTest, RowsWithoutAirHaveNoC_TAndItsPressureIsNotSoughtAgain) {
+  std::string csv = "b,N,T,p,y\n";
+  for (int r = 0; r < 96; ++r) {
+    const double celsius = 15 + 10 * even(random), hPa = 990 + 30 * even(random);
+    csv += fmt::format("{},5000,{},{},{}\n", r / 8, r == 7 ? "" : fmt::format("{}", celsius), hPa,
+                       6 * hPa / 1013 * 288 / (celsius + 273) * (1 + 0.001 * scatter(random)));
+  }
+  const std::string schema =
+      std::string(kThrustAndSpeed) + kPropeller +
+      "[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\nmeaning = \"air_temperature_C\"\n"
+      "[[covariates]]\ncolumn = \"p\"\nunit = \"hPa\"\nmeaning = \"air_pressure_Pa\"\n";
+  const Observations o = observed(csv, schema);
+  EXPECT_EQ(o.rows(), 95);
+  EXPECT_THAT(o.left_out, ElementsAre("1 rows: the temperature or the pressure of the air is empty, so they "
+                                      "have no C_T"));
+  EXPECT_THAT(testability(effect_named("air_pressure"), o).reason, HasSubstr("density"));
+  EXPECT_EQ(explained(o).verdict, "no_structure");
+  EXPECT_EQ(observed(csv, schema, "constant").rows(), 96);
 }
 
 /// Of a cell for forces and moments: both load it.
