@@ -8,13 +8,13 @@ namespace tunnelrig {
 namespace {
 
 /// First runs of a step that was found at run `found`: those of its session, of the open ones on either side,
-/// and of what lies between. Of a table, whose blocks need not be in order, the first rows of blocks since
-/// the open row before.
+/// and of what lies between. Where blocks do not follow each other, the first rows of blocks since the open
+/// row before.
 std::vector<int> candidates(const Observations& observations, const std::vector<int>& open, int found) {
   const auto block = [&](int row) { return observations.block[static_cast<std::size_t>(row)]; };
   const auto at = std::lower_bound(open.begin(), open.end(), found);
   std::vector<int> result;
-  if (observations.from_table) {
+  if (!observations.blocks_follow_each_other()) {
     for (int row = at == open.begin() ? 1 : *std::prev(at) + 1; row <= found; ++row)
       if (block(row) != block(row - 1)) result.push_back(row);
     return result;

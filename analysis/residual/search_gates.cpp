@@ -87,7 +87,7 @@ bool Search::is_gradual(const std::vector<Term>& steps, const NullFit& variances
 }
 
 JointFit Search::at_best_run(JointFit fit, std::size_t from_newest) const {
-  if (observations_.from_table) return fit;  // whose blocks need not be in order
+  if (!observations_.blocks_follow_each_other()) return fit;
   const std::size_t t = fit.model.terms.size() - from_newest;
   const auto& parameters = fit.model.terms[t].effect->parameters;
   for (std::size_t k = 0; k < parameters.size(); ++k) {

@@ -1,8 +1,7 @@
 // Steps: where they are, and what is none.
 #include "analysis/residual/explanation_output.h"
 #include "analysis/residual/explanation_parts.h"
-#include "analysis/residual/simulated.h"
-#include "support/seeds.h"
+#include "analysis/residual/tables.h"
 
 #include <gmock/gmock.h>
 
@@ -15,9 +14,7 @@ using test::explained;
 using testing::Contains;
 using testing::HasSubstr;
 
-struct Steps : testing::Test {
-  std::mt19937_64 random{test::seed()};
-
+struct Steps : test::TablesTest {
   /// Runs of four rotors in 16 sessions, with their order as a condition.
   Observations ordered() {
     Observations o = test::simulate(
@@ -109,6 +106,19 @@ TEST_F(Steps, OneInTheMidstOfASessionIsPlacedThere) {
   EXPECT_LE(run.low, static_cast<double>(first));
   EXPECT_GE(run.high, static_cast<double>(first));
   EXPECT_TRUE(e.unknown.empty());
+}
+
+TEST_F(Steps, OneInTheMidstOfATablesBlockIsPlacedThere) {
+  std::string csv = "b,run_order,y\n";
+  for (int r = 0; r < 120; ++r)
+    csv += fmt::format("{},{},{}\n", r / 10, r, (r < 63 ? 8 : 8.25) * (1 + 0.002 * scatter(random)));
+  const Explanation e =
+      explained(observed(csv,
+                         "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+                         "meaning = \"thrust_N\"\n[[covariates]]\ncolumn = \"run_order\"\nunit = \"1\"\n"));
+  ASSERT_EQ(e.adopted.size(), 1u) << explanation_text(e);
+  EXPECT_EQ(e.adopted[0].parameters[1].value, 63);
+  EXPECT_TRUE(e.suspect_rows.empty());
 }
 
 /// No model of the open runs can know on which side of the step a sealed session between them lies.
