@@ -65,7 +65,7 @@ void Search::make_models() {
 OwnEvidence::OwnEvidence(const Observations& observations, const MixedModel& baseline)
     : observations_(observations),
       baseline_(baseline),
-      predicted_(predict_response(observations, {known_terms(observations), {}}, baseline.rows())) {}
+      predicted_(predict_response(observations, {terms_of_theory(observations), {}}, baseline.rows())) {}
 
 bool OwnEvidence::operator()(const Term& way) const {
   return baseline_.sees(respond(way, observations_, predicted_).derivative[0]);

@@ -20,10 +20,12 @@ constexpr double kRareWeight = 10;       // stiff blades do not flex, while a Re
 constexpr double kTheoryRefused = 0.05;  // p at which the data speak against theory's coefficient
 constexpr double kSwapDecades = 0.7;     // another explains that much better: it takes the place
 
-double prior_weight(const Term& term, std::size_t ways) {
+double prior_weight(const Term& term, const Observations& observations, std::size_t ways) {
   const Effect& effect = *term.effect;
   double weight = effect.theory() ? kKnownPhysicsWeight : 1;
-  if (effect.name == "blade_flex") weight /= kRareWeight;
+  // Of a C_T that goes with the speed a cell that bends as much is the rarest cause.
+  const bool bent_cell = effect.name == "nonlinearity" && observations.coefficient;
+  if (effect.name == "blade_flex" || bent_cell) weight /= kRareWeight;
   if (effect.scope == EffectScope::kRotor && term.rotor >= 0) weight /= 4;
   if (effect.scope == EffectScope::kPair) weight /= 12;
   if (effect.has_change_point()) weight /= std::max<double>(1, static_cast<double>(ways));
@@ -80,7 +82,7 @@ Candidate Search::candidate_of(const Term& way, const Eigen::MatrixXd& predicted
           .sign = amplitude.lower >= 0   ? 1
                   : amplitude.upper <= 0 ? -1
                                          : 0,
-          .weight = prior_weight(way, points)};
+          .weight = prior_weight(way, observations_, points)};
 }
 
 void Search::rank(const JointFit& base, Scan& scan) const {

@@ -202,6 +202,16 @@ bool forces_differ(const Observations& observations) {
   return variance > least * variance_of_constants(observations, predicted).sum();
 }
 
+/// Whether a constant error is another share of each row's force: where that goes with the measured speed,
+/// and the baseline is no line or power law, which would take it up.
+bool shows_zero_offset(const Observations& observations) {
+  const bool made_c_t = observations.coefficient && !observations.of_air;
+  const bool thrust =
+      observations.of_air && !observations.coefficient && observations.find("speed_rpm") != nullptr;
+  return observations.from_table && observations.multiplicative && observations.baseline_over.empty() &&
+         (made_c_t || thrust);
+}
+
 }  // namespace
 
 std::string Term::label() const {
@@ -274,8 +284,12 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason = "the response has one sign";
   if (observations.coefficient && effect.name == "rotor_speed")
     result.reason = "the measured speed is part of the response";
-  if (observations.coefficient && (effect.name == "nonlinearity" || effect.name == "bidirectional"))
+  if (observations.coefficient && observations.of_air &&
+      (effect.name == "nonlinearity" || effect.name == "bidirectional"))
     result.reason = "a coefficient is no force that a cell has read";
+  if (effect.name == "zero_offset" && !shows_zero_offset(observations))
+    result.reason =
+        "only a table's thrust whose speed was measured shows it, by how large it is beside small ones";
   if (observations.is_line() && (effect.name == "nonlinearity" || effect.name == "bidirectional"))
     result.reason = "a curve over the baseline's column says where it is not straight";
   if (effect.needs_previous && std::all_of(observations.previous.begin(), observations.previous.end(),
@@ -287,9 +301,13 @@ Testability testability(const Effect& effect, const Observations& observations) 
 }
 
 std::vector<Term> known_terms(const Observations& observations) {
+  return observations.from_table ? std::vector<Term>() : terms_of_theory(observations);
+}
+
+std::vector<Term> terms_of_theory(const Observations& observations) {
   std::vector<Term> terms;
   for (const Effect& effect : all_effects())
-    if (effect.theory_only && !observations.from_table && testability(effect, observations).ok())
+    if (effect.theory_only && testability(effect, observations).ok())
       terms.push_back({.effect = &effect, .at_theory = true, .parameters = {*effect.theory()}});
   return terms;
 }

@@ -95,7 +95,7 @@ TEST(Effects, AreExactlyTheNamesOfTheList) {
                   "zero_drift_time", "span_drift_temperature", "temperature_gradient", "excitation_voltage",
                   "reference_drift", "creep", "creep_recovery", "hysteresis", "nonlinearity", "bidirectional",
                   "crosstalk", "axis_tilt", "cable_force", "mounting_step", "propeller_step", "mains_pickup",
-                  "vibration_alias", "structural_resonance", "adc_clipping", "clock_lag"));
+                  "vibration_alias", "structural_resonance", "adc_clipping", "clock_lag", "zero_offset"));
 }
 
 TEST(Effects, AreDescribed) {

@@ -63,6 +63,29 @@ TEST_F(TableSourceTest, RowsWithoutASpeedHaveNoC_TAndAreSaid) {
   EXPECT_EQ(observed(csv, schema).rows(), 106);  // they do have a thrust
 }
 
+/// A cell's own faults, by how much larger they are beside small (or large) thrusts.
+TEST_F(TableSourceTest, AZeroThatWasNotTakenOffAndACellThatBendsAreFoundInThrusts) {
+  const auto with = [&](double zero_N, double bent_per_N) {
+    std::string csv = "b,N,y\n";
+    for (int r = 0; r < 96; ++r) {
+      const double rpm = 3000 + 4000 * even(random), force_N = 6 * std::pow(rpm / 5000, 2);
+      csv += fmt::format("{},{},{}\n", r / 8, rpm,
+                         (force_N * (1 + bent_per_N * force_N) + zero_N) * (1 + 0.002 * scatter(random)));
+    }
+    return csv;
+  };
+  for (const std::string propeller : {"", kPropeller}) {
+    const Explanation e = explained(observed(with(0.06, 0), kThrustAndSpeed + propeller));
+    ASSERT_EQ(names(e), propeller.empty() ? "rotor_speed zero_offset " : "zero_offset ");
+    EXPECT_NEAR(e.adopted.back().parameters[0].value, 0.06, 0.01);
+  }
+  const Explanation bent = explained(observed(with(0, 0.006), kThrustAndSpeed));
+  ASSERT_EQ(bent.adopted.size(), 2u);
+  std::vector<std::string> set = bent.adopted[1].confounded_with;
+  set.push_back(bent.adopted[1].term.effect->name);
+  EXPECT_THAT(set, Contains("nonlinearity"));
+}
+
 /// The density that C_T is made with has the pressure; it is not sought again.
 TEST_F(TableSourceTest, RowsWithoutAirHaveNoC_TAndItsPressureIsNotSoughtAgain) {
   std::string csv = "b,N,T,p,y\n";
