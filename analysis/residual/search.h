@@ -28,8 +28,8 @@ class Search {
     std::vector<Candidate> candidates;
     std::vector<CandidateFit> fits;
     std::unique_ptr<CandidateScan> scan;
-    std::vector<std::size_t> order;            // by evidence, best first
-    std::map<std::size_t, Term> partner = {};  // of ways that are two effects: the second
+    std::vector<std::size_t> order;                        // by evidence, best first
+    std::map<std::size_t, std::vector<Term>> others = {};  // of ways that are several effects: but the first
   };
 
   struct CurveScan {
@@ -91,11 +91,14 @@ class Search {
   /// Of a term that is a step, counted from the newest (1): from the run on, of the sessions on either side,
   /// where it is likeliest.
   JointFit at_best_run(JointFit fit, std::size_t from_newest) const;
-  // two of which neither can be seen alone: search_pairs.cpp
-  static void add_pair(Scan& scan, std::size_t one, std::size_t two, double weight);
+  // several of which none can be seen alone: search_several.cpp
+  static void add_together(Scan& scan, const std::vector<std::size_t>& ways, double weight);
   void add_pairs_of_steps(Scan& scan) const;  // of two rotors at one run
-  void add_pairs_of_axes(Scan& scan) const;   // of a table: crosstalk from both
-  bool accept_pair(const Scan& scan, std::size_t i, double p);
+  void add_several_axes(Scan& scan) const;    // of a table: crosstalk from each two, and from all
+  JointFit fit_with_all(const std::vector<Term>& terms) const;
+  /// Those that are there beside the others.
+  std::vector<Term> needed_of(std::vector<Term> terms) const;
+  bool accept_together(const Scan& scan, std::size_t i, double p);
   /// Whether a course that is straight or bends once over the order of runs does as well as the step.
   bool is_gradual(const std::vector<Term>& steps, const NullFit& variances,
                   const CrossValidation& with_steps) const;

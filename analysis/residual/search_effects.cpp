@@ -150,11 +150,13 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
   const CrossValidation before = unseen(fit_, fit_.variances);
   for (const std::size_t best : scan.order) {
     if (scan.fits[best].evidence < critical_) break;
-    if (scan.partner.contains(best)) {
-      if (!accept_pair(scan, best, maxima.p(scan.fits[best].evidence))) continue;
-      const auto newest = result_.accepted.end();
-      round.outcome +=
-          fmt::format("accepted {} and {}", (newest - 2)->term.label(), (newest - 1)->term.label());
+    if (scan.others.contains(best)) {
+      const std::size_t had = result_.accepted.size();
+      if (!accept_together(scan, best, maxima.p(scan.fits[best].evidence))) continue;
+      std::vector<std::string> labels;
+      for (std::size_t k = had; k < result_.accepted.size(); ++k)
+        labels.push_back(result_.accepted[k].term.label());
+      round.outcome += fmt::format("accepted {}", fmt::join(labels, " and "));
       return true;
     }
     if (std::find(refused.begin(), refused.end(), scan.ways[best].effect) != refused.end()) continue;
@@ -285,7 +287,7 @@ void Search::set_detectable(const Scan& scan) {
   for (std::size_t i = 0; i < scan.candidates.size(); ++i) {
     const Term& way = scan.ways[i];
     const bool alike = way.rotor < 0 || way.effect->scope == EffectScope::kPair;
-    if (!alike || way.per_group || scan.partner.contains(i)) continue;
+    if (!alike || way.per_group || scan.others.contains(i)) continue;
     const double z = std::sqrt(2 * scan.fits[i].likelihood_ratio);
     const double size = std::abs(scan.fits[i].amplitude(0)) * rms_of(scan.candidates[i].columns[0][0]);
     if (z > 0 && size > 0) errors[way.effect->name].emplace_back(size / z, i);

@@ -22,7 +22,7 @@ Search::Scan Search::scan_effects_and_groups(const JointFit& base) const {
   Scan scan = list_effects(base);
   if (observations_.channels() == 1) {
     add_group_ways(scan);
-    add_pairs_of_axes(scan);
+    add_several_axes(scan);
   } else {
     add_pairs_of_steps(scan);
   }
@@ -125,12 +125,12 @@ std::size_t Search::alike_instead(const Scan& scan, std::size_t i) const {
 }
 
 bool Search::another_does_as_well(const CrossValidation& own, const NullFit& variances) const {
-  constexpr std::size_t kTried = 3;
+  constexpr std::size_t kTried = 5;
   if (static_cast<int>(result_.accepted.size()) >= settings_.most_effects) return false;
   const Scan scan = scan_effects(fit_);
   std::vector<std::string> tried;
   for (const std::size_t i : scan.order) {
-    const std::string& name = scan.ways[i].effect->name;
+    const std::string name = scan.ways[i].label();
     if (scan.fits[i].evidence < critical_ || tried.size() == kTried) break;
     if (std::find(tried.begin(), tried.end(), name) != tried.end()) continue;
     tried.push_back(name);

@@ -1,7 +1,9 @@
 // Which rows of a table are explained, and as what.
 #include "analysis/residual/tables.h"
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -148,6 +150,42 @@ TEST_F(TableSourceTest, TwoAxesThatHideEachOtherAreBothFound) {
   for (const AdoptedEffect& adopted : e.adopted)
     EXPECT_NEAR(adopted.parameters[0].value, adopted.term.effect->form == "fx" ? 0.02 : -0.02, 0.001);
   EXPECT_LT(e.after.held_out_rmse, 0.1 * e.before.held_out_rmse);
+}
+
+/// A cell of six axes, loaded at arms: five of them leak in, and hide each other.
+TEST_F(TableSourceTest, ManyAxesThatHideEachOtherAreAllFound) {
+  const std::vector<std::string> axes = {"fx", "fy", "fz", "mx", "my"};
+  const std::vector<double> leaks = {1, 0.02, 0.01, 0.12, 0.25};
+  const std::vector<std::pair<int, std::map<int, double>>> mounts = {
+      {1, {}}, {1, {{3, -0.15}}}, {0, {}}, {0, {{4, 0.15}}}, {2, {}}, {2, {{3, 0.12}}}, {2, {{4, -0.12}}}};
+  std::string csv = "mount,fx,fy,fz,mx,my,y\n";
+  for (std::size_t m = 0; m < 2 * mounts.size(); ++m) {
+    const auto& [main, arms] = mounts[m % mounts.size()];
+    const double zero = 0.3 * scatter(random);
+    for (const double load : {0.0, 0.6, 1.4, 2.8, 3.9, 6.7, 11.3, 15.9, 21.7}) {
+      double reading = zero + 0.02 * scatter(random);
+      csv += fmt::format("m{}", m);
+      for (int axis = 0; axis < 5; ++axis) {
+        const double applied = axis == main ? load : arms.contains(axis) ? arms.at(axis) * load : 0;
+        reading += leaks[static_cast<std::size_t>(axis)] * applied;
+        csv += fmt::format(",{}", applied);
+      }
+      csv += fmt::format(",{}\n", reading);
+    }
+  }
+  std::string schema = "groups = [\"mount\"]\n[response]\ncolumn = \"y\"\nunit = \"N\"\n";
+  for (const std::string& axis : axes)
+    schema +=
+        fmt::format("[[covariates]]\ncolumn = \"{}\"\nunit = \"{}\"\n", axis, axis[0] == 'f' ? "N" : "N m");
+  const Observations o = observed(csv, schema, "linear:fx");
+  const TableEffects effects(o, test::every_effect());
+  const Explanation e = explain(o, effects.all, test::quick());
+  ASSERT_EQ(names(e), "crosstalk crosstalk crosstalk crosstalk ");
+  for (const AdoptedEffect& adopted : e.adopted) {
+    const auto axis = std::find(axes.begin(), axes.end(), adopted.term.effect->form) - axes.begin();
+    const double leak = leaks[static_cast<std::size_t>(axis)];
+    EXPECT_NEAR(adopted.parameters[0].value, leak, 0.004 + 0.1 * leak);
+  }
 }
 
 }  // namespace
