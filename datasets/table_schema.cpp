@@ -150,6 +150,9 @@ void read_speed(const Reader& top, TableSchema& schema) {
     throw InputError::at(file, Reader::line(*table),
                          "speed.pole_count is required where the speed is electrical");
   }
+  if (poles && std::fmod(*poles, 2) != 0)
+    throw InputError::at(file, Reader::line(*table),
+                         "speed.pole_count is {:g}: poles come in pairs, so it is an even number", *poles);
   if (poles) schema.speed_factor = 2 / *poles;
 }
 
@@ -162,6 +165,9 @@ void read_propeller(const Reader& top, TableSchema& schema) {
   schema.diameter_m = reader.number("diameter_m", 0.01, 10);
   schema.diameter_column = reader.string("diameter_column");
   if (!schema.diameter_column) return;
+  if (schema.diameter_m)
+    throw InputError::at(file, Reader::line(*table),
+                         "propeller.diameter_m and propeller.diameter_column: write one of them");
   const std::string name = reader.required_string("diameter_unit");
   const Unit& unit = unit_from_name(name);
   if (unit.quantity != "length") {

@@ -70,6 +70,9 @@ TEST(Observations, NamesWhatIsWrong) {
   EXPECT_THAT(refusal(kSchema, "column = \"T\"", "column = \"thrust\""),
               HasSubstr("t.csv:1: the required column thrust is missing"));
   EXPECT_THAT(refusal(kSchema, "pole_count = 14\n", ""), HasSubstr("speed.pole_count is required"));
+  EXPECT_THAT(refusal(kSchema, "pole_count = 14\n", "pole_count = 7\n"), HasSubstr("even number"));
+  EXPECT_THAT(refusal(kSchema, "diameter_column = \"D\"\n", "diameter_column = \"D\"\ndiameter_m = 0.2\n"),
+              HasSubstr("write one of them"));
   EXPECT_THAT(refusal(kSchema, "bins(N, 4)", "bins(N)"), HasSubstr("blocks = \"bins(N)\""));
   EXPECT_THAT(refusal(kSchema, "bins(N, 4)", "day"), HasSubstr("the required column day is missing"));
   EXPECT_THAT(refusal(kSchema, "\"air_temperature_C\"", "\"warmth\""),
