@@ -9,7 +9,7 @@
 namespace tunnelrig {
 namespace {
 
-constexpr std::size_t kNamed = 6;          // runs that a finding names before it says how many more there are
+constexpr std::size_t kNamedRuns = 6;      // runs that a finding names before it says how many more there are
 constexpr double kMuchLost = 0.01;         // share of a run's frames
 constexpr double kSpeedTolerance = 0.003;  // of the nominal speed, the thesis's ±15 rev/min
 constexpr double kTachometerAgrees = 0.005;  // shaft line against tachometer
@@ -23,7 +23,7 @@ class Names {
   bool empty() const { return names_.empty(); }
   std::size_t size() const { return names_.size(); }
   std::string text() const {
-    const std::size_t shown = std::min(kNamed, names_.size());
+    const std::size_t shown = std::min(kNamedRuns, names_.size());
     std::string text = fmt::format(
         "{}", fmt::join(names_.begin(), names_.begin() + static_cast<std::ptrdiff_t>(shown), ", "));
     if (names_.size() > shown) text += fmt::format(" and {} more", names_.size() - shown);

@@ -18,9 +18,9 @@ using Eigen::VectorXd;
 
 /// Times within a run at which an effect that changes with time is evaluated, as in the fit.
 constexpr int kTimes = 32;
-constexpr int kMostSteps = 200;
+constexpr int kMostInversions = 200;
 constexpr double kConverged = 1e-12;  // relative change of the last step; the promise is 1e-10
-constexpr double kStep = 1e-4;        // of derivatives by parameters, in standard uncertainties or relative
+constexpr double kDifference = 1e-4;  // of derivatives by parameters, in standard uncertainties or relative
 constexpr double kReadingStep = 1e-6;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -99,7 +99,7 @@ class Forward {
   /// The forces that read `reading_N`; nothing where the steps do not settle.
   std::optional<VectorXd> forces(Index row, const VectorXd& reading_N, const VectorXd& parameters) const {
     VectorXd force_N = reading_N;
-    for (int step = 0; step < kMostSteps; ++step) {
+    for (int step = 0; step < kMostInversions; ++step) {
       const VectorXd read_N = reading(row, force_N, parameters);
       const VectorXd next = model_.multiplicative
                                 ? VectorXd(force_N.array() * reading_N.array() / read_N.array())
@@ -238,7 +238,7 @@ MatrixXd parameter_slopes(const Forward& forward, Index row, const VectorXd& rea
   MatrixXd slopes = MatrixXd::Zero(reading_N.size(), parameters.size());
   for (Index k = 0; k < parameters.size(); ++k) {
     if (!(covariance(k, k) > 0)) continue;
-    const double step = std::max(kStep * std::sqrt(covariance(k, k)), 1e-7 * std::abs(parameters(k)));
+    const double step = std::max(kDifference * std::sqrt(covariance(k, k)), 1e-7 * std::abs(parameters(k)));
     VectorXd above = parameters, below = parameters;
     above(k) += step;
     below(k) -= step;

@@ -9,9 +9,9 @@
 namespace tunnelrig {
 namespace {
 
-constexpr std::size_t kRowsPerGross = 10;  // at most one row of ten is set aside
-constexpr std::size_t kRunsPerGross = 25;  // what touches more runs of a campaign is no slip of the hand
-constexpr int kMostSearches = 2;           // after the first, each without the gross rows of the one before
+constexpr std::size_t kRowsPerGrossOne = 10;  // at most one row of ten is set aside
+constexpr std::size_t kRunsPerGross = 25;     // what touches more runs of a campaign is no slip of the hand
+constexpr int kMostSearches = 2;  // after the first, each without the gross rows of the one before
 
 std::vector<int> rows_but(const Observations& observations, const std::vector<SuspectRow>& left_out) {
   std::vector<int> rows;
@@ -30,7 +30,7 @@ struct SetAside {
   std::vector<SuspectRow> rows;
 
   explicit SetAside(const Observations& all)
-      : kept(all), most(all.name.size() / (all.from_table ? kRowsPerGross : kRunsPerGross)) {}
+      : kept(all), most(all.name.size() / (all.from_table ? kRowsPerGrossOne : kRunsPerGross)) {}
   std::size_t room() const { return most - std::min(most, rows.size()); }
   void take(const std::vector<SuspectRow>& gross) {
     kept = kept.subset(rows_but(kept, gross));
@@ -125,6 +125,7 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
     settings.taken_back.insert(settings.taken_back.end(), found.terms.begin(), found.terms.end());
     if (found.all) std::erase_if(effects, [](const Effect* effect) { return !effect->theory_only; });
     Explanation without = explain_once(observations, effects, settings);
+    without.untestable = explanation.untestable;
     const bool stay = worse(explanation.sealed.curves, explanation.sealed.all) &&
                       worse(without.sealed.names, explanation.sealed.all);
     if (found.all) said.push_back(taken_back_all(explanation));
@@ -170,6 +171,7 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
   if (observations.from_table)
     explanation = without_isolated(std::move(explanation), aside, effects, settings);
   explanation = without_refuted(std::move(explanation), aside.kept, effects, settings);
+  explanation = without_names_of_incomplete(std::move(explanation), aside.kept, effects, settings);
   explanation.suspect_rows.insert(explanation.suspect_rows.begin(), aside.rows.begin(), aside.rows.end());
   return explanation;
 }

@@ -33,6 +33,15 @@ void warn_of_scatter(const Observations& observations, Explanation& explanation)
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
 
+// --- incomplete_conditions.cpp
+
+/// Holds what was found against the runs that have all conditions of which some runs lack a value. Where
+/// these say that it is the work of such a condition, names that they do not confirm are taken back, and it
+/// is said.
+Explanation without_names_of_incomplete(Explanation explanation, const Observations& observations,
+                                        const std::vector<const Effect*>& effects,
+                                        const SearchSettings& settings);
+
 // --- change_points.cpp
 
 /// Where a step may lie as well, as far as all runs tell.

@@ -11,7 +11,7 @@ using Eigen::Index;
 
 constexpr std::size_t kSimulated = 100;
 constexpr double kKnown = 0.5;  // correlation of the second simulation
-constexpr double kMost = 0.9;
+constexpr double kMostCorrelated = 0.9;
 
 /// Σ e_i e_{i+1} / Σ e_i² over neighbours within blocks, one per column.
 Eigen::VectorXd of_neighbours(const MixedModel& model, std::size_t stratum, const Stacked& columns) {
@@ -58,7 +58,7 @@ std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fi
     if (seen < none.mean + 2 * none.deviation) continue;
     const Spread known = simulated(model, fit, s, kKnown, random);
     result[model.strata()[s].side()] =
-        std::clamp(kKnown * (seen - none.mean) / (known.mean - none.mean), 0.0, kMost);
+        std::clamp(kKnown * (seen - none.mean) / (known.mean - none.mean), 0.0, kMostCorrelated);
   }
   return result;
 }

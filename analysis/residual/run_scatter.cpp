@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kUnlike = 2;  // less makes no structure
-constexpr double kLeastLeft = 1e-3;
+constexpr double kLeastLeftOfMean = 1e-3;
 
 /// Of each set of runs: ln of its mean size over what runs that are alike have there.
 struct Compared {
@@ -63,7 +63,7 @@ void let_differ(const std::vector<int>& number, const std::vector<int>& rows, co
     by_number[number[static_cast<std::size_t>(rows[k])]].push_back(static_cast<Index>(k));
   // Nothing is left of the only run at a location, nor of a session of such.
   std::erase_if(by_number,
-                [&](const auto& set) { return alike(set.second, Eigen::all).mean() < kLeastLeft; });
+                [&](const auto& set) { return alike(set.second, Eigen::all).mean() < kLeastLeftOfMean; });
   if (by_number.size() < kFewestToCompare) return;
   std::vector<std::vector<Index>> sets;
   for (const auto& [of, runs] : by_number) sets.push_back(runs);

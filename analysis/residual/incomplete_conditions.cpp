@@ -1,0 +1,101 @@
+// Conditions that most runs have, but not all. They are no candidates, and so another may get the name of
+// what they do, if it goes with them.
+#include "analysis/residual/explanation_parts.h"
+
+#include <algorithm>
+#include <set>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace tunnelrig {
+namespace {
+
+constexpr double kMostMissing = 0.25;
+
+/// The conditions that so few runs lack that the others can be looked at alone.
+std::vector<std::string> nearly_complete(const Observations& observations) {
+  std::vector<std::string> names;
+  for (const auto& [name, why] : observations.not_usable) {
+    const Covariate* covariate = observations.find(name);
+    if (covariate == nullptr || covariate->derived || !why.starts_with("missing")) continue;
+    const auto missing = static_cast<double>(covariate->value.array().isNaN().count());
+    if (missing <= kMostMissing * static_cast<double>(covariate->value.size())) names.push_back(name);
+  }
+  return names;
+}
+
+/// The runs that have all of them, in which they are candidates. Nothing where a block has none left.
+Observations with_all(Observations observations, const std::vector<std::string>& names) {
+  std::vector<int> rows;
+  std::set<int> blocks;
+  for (const int row : observations.all_rows()) {
+    const bool has_all = std::ranges::all_of(
+        names, [&](const std::string& name) { return observations.find(name)->value.row(row).allFinite(); });
+    if (!has_all) continue;
+    rows.push_back(row);
+    blocks.insert(observations.block[static_cast<std::size_t>(row)]);
+  }
+  if (static_cast<int>(blocks.size()) < observations.blocks()) rows.clear();
+  observations = observations.subset(rows);
+  for (const std::string& name : names) observations.not_usable.erase(name);
+  return observations;
+}
+
+bool needs_one_of(const AdoptedEffect& adopted, const std::vector<std::string>& names) {
+  return std::ranges::any_of(adopted.term.effect->covariates, [&](const std::string& covariate) {
+    return std::ranges::find(names, covariate) != names.end();
+  });
+}
+
+/// What was found there that goes with one of them, in words.
+std::vector<std::string> found_with(const Explanation& explanation, const std::vector<std::string>& names) {
+  std::vector<std::string> found;
+  for (const AdoptedEffect& adopted : explanation.adopted)
+    if (needs_one_of(adopted, names)) found.push_back(adopted.term.label());
+  for (const UnknownStructure& unknown : explanation.unknown)
+    if (std::ranges::find(names, unknown.covariate) != names.end())
+      found.push_back("structure over " + unknown.covariate);
+  return found;
+}
+
+}  // namespace
+
+Explanation without_names_of_incomplete(Explanation explanation, const Observations& observations,
+                                        const std::vector<const Effect*>& effects,
+                                        const SearchSettings& settings) {
+  const std::vector<std::string> incomplete = nearly_complete(observations);
+  if (incomplete.empty() || (explanation.adopted.empty() && explanation.unknown.empty())) return explanation;
+  const Observations complete = with_all(observations, incomplete);
+  if (complete.rows() == 0) return explanation;
+  const Explanation there = explain_once(complete, effects, settings);
+  const std::vector<std::string> found = found_with(there, incomplete);
+  if (found.empty()) return explanation;
+
+  const auto is_found_there = [&](const Effect& effect) {
+    return std::ranges::any_of(there.adopted, [&](const AdoptedEffect& adopted) {
+      return adopted.term.effect->name == effect.name;
+    });
+  };
+  std::vector<std::string> gone;
+  for (const AdoptedEffect& adopted : explanation.adopted)
+    if (!is_found_there(*adopted.term.effect)) gone.push_back(adopted.term.label());
+  if (!gone.empty()) {
+    std::vector<const Effect*> left;
+    for (const Effect* effect : effects)
+      if (effect->theory_only || is_found_there(*effect)) left.push_back(effect);
+    Explanation again = explain_once(observations, left, settings);
+    again.untestable = std::move(explanation.untestable);
+    explanation = std::move(again);
+  }
+  explanation.warnings.push_back(fmt::format(
+      "in the {} of {} {} that have {}, {} is found{}: fill in what is missing", complete.rows(),
+      observations.rows(), observations.from_table ? "rows" : "runs", fmt::join(incomplete, " and "),
+      fmt::join(found, " and "),
+      gone.empty()
+          ? ""
+          : fmt::format(", and {} is not, which is taken back therefore", fmt::join(gone, " and "))));
+  return explanation;
+}
+
+}  // namespace tunnelrig
