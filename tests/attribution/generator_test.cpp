@@ -335,6 +335,21 @@ TEST(Tracks, ConfoundedPairsCannotBeTold) {
   }
 }
 
+/// The partner must be able to do it: no blade sees more than a few times Prandtl and Glauert's 1/2.
+TEST(Tracks, AConfoundedMachNumberNeedsNoImpossibleExponent) {
+  int impossible = 0;
+  for (const Noise noise : {Noise::kWhite, Noise::kSession})
+    for (std::uint64_t seed = test::seed(); seed < test::seed() + 20; ++seed) {
+      const Campaign campaign = generate(
+          {.track = Track::kConfounded, .noise = noise, .effects = {"reynolds_number"}, .seed = seed});
+      Random random(0, "partner");
+      Sized partner{.effect = make_effect("tip_mach", random), .amplitude = 1};
+      measure(partner, campaign.world, campaign.noise, campaign.open_space);
+      impossible += campaign.effects.front().rms > 2 * partner.rms;
+    }
+  EXPECT_LE(impossible, 1);
+}
+
 TEST(Tracks, SingleEffectsCanBeToldFromTheirLikes) {
   const std::map<std::string, std::string> likes = {{"span_drift_temperature", "zero_drift_temperature"},
                                                     {"zero_drift_temperature", "span_drift_temperature"},

@@ -236,7 +236,7 @@ World plan_world(const Settings& settings, const Design& design) {
       days(settings.seed, "conditions"), field(settings.seed, "field");
   World world;
   world.blocks = settings.blocks;
-  const Weather weather(weather_random, design.hot_weather, design.pressure_swing_Pa);
+  const Weather weather(weather_random, design.hot_weather, design.pressure_swing_Pa, design.warmth_swing_K);
   Rig rig(days, weather, design);
   const std::vector<Visit> visits = plan_visits(settings, design, order);
   double start_s = 0;

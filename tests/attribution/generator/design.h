@@ -20,6 +20,7 @@ struct Design {
   bool sagging_supply = false;  // falls in proportion to the time in the session and with nothing else
   double speed_scatter_rpm = 5.5;
   double pressure_swing_Pa = 450;  // of the weather
+  double warmth_swing_K = 1.5;     // of the weather
   double cell_swing_K = 0.9;       // of a cell's temperature within hours
   bool hot_weather = false;        // humid air weighs less than dry air only where it is warm
 };

@@ -128,9 +128,12 @@ Truth draw_confounded(const Settings& settings, Random& random) {
   truth.design.sagging_supply = pair.sagging_supply;
   truth.design.cell_swing_K = design_for(pair.truth).cell_swing_K;
   if (truth.effects[0] == "reynolds_number") {
-    // pressure is in the Reynolds number and not in the Mach number; speed weighs less in it than temperature
+    // Pressure is in the Reynolds number and not in the Mach number; speed weighs less in it than
+    // temperature. The Mach number does little at these speeds: in a steady climate it would need an exponent
+    // that no blade has, and physics would tell the two apart. So this is a hall without heating.
     truth.design.pressure_swing_Pa = 50;
     truth.design.speed_scatter_rpm = 0.8;
+    truth.design.warmth_swing_K = 12;
   }
   truth.design.thrust_spread = kLevel;
   return truth;

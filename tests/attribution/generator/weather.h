@@ -24,14 +24,14 @@ struct Air {
 
 class Weather {
  public:
-  Weather(Random& random, bool hot, double pressure_swing_Pa);
+  Weather(Random& random, bool hot, double pressure_swing_Pa, double warmth_swing_K);
 
   /// `session_time_h` since people, lamps and motors began to warm the room.
   Air at(double time_s, double session_time_h) const;
 
  private:
   Course fronts_, warmth_, moisture_;
-  double mean_C_, pressure_swing_Pa_;
+  double mean_C_, pressure_swing_Pa_, warmth_swing_K_;
 };
 
 }  // namespace tunnelrig::attribution
