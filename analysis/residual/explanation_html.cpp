@@ -202,7 +202,12 @@ class Page {
     const MatrixXd fitted =
         observations_.multiplicative ? MatrixXd(added.array() * forces_.predicted.array()) : added;
     std::vector<std::string> names = adopted.term.effect->covariates;
-    if (names.empty()) names = {"run_order"};
+    if (names.empty() && adopted.term.effect->needs_previous) names = {"run_order"};
+    if (names.empty()) {  // it goes with the force itself
+      list.push_back(panel(adopted.term.label(), "predicted " + explanation_.response, forces_.predicted,
+                           adopted.term.rotor, fitted));
+      list.back()["covariate_unit"] = explanation_.unit;
+    }
     for (const std::string& name : names) {
       const Covariate* covariate = observations_.find(name);
       if (covariate == nullptr || !(covariate->value.maxCoeff() > covariate->value.minCoeff())) continue;

@@ -324,6 +324,26 @@ TEST_F(ExplainTable, NamesAStrongEffect) {
   EXPECT_EQ(e["response"], "F");
 }
 
+/// What goes with the force itself is drawn over that, run order or not.
+TEST_F(ExplainTable, AZeroThatWasNotTakenOffIsDrawnOverTheForce) {
+  std::string csv = "day,N,F\n";
+  for (int row = 0; row < 80; ++row) {
+    const double rpm = std::uniform_real_distribution<double>(3000, 7000)(random);
+    csv += fmt::format("d{},{:.1f},{:.5f}\n", row / 8, rpm,
+                       (6 * std::pow(rpm / 5000, 2) + 0.08) * (1 + normal(0.002)));
+  }
+  write_text(folder / "t.csv", csv);
+  write_text(folder / "t.toml",
+             "format = \"tunnelrig-table/1\"\nname = \"t\"\nblocks = \"day\"\n[response]\ncolumn = \"F\"\n"
+             "unit = \"N\"\nmeaning = \"thrust_N\"\n[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n"
+             "[propeller]\ndiameter_m = 0.25\n");
+  ASSERT_EQ(import_table().code, 0);
+  const json e = explained("--html e.html");
+  ASSERT_EQ(e["adopted"].size(), 1u);
+  EXPECT_EQ(e["adopted"][0]["effect"], "zero_offset");
+  EXPECT_THAT(read_text(folder / "e.html"), HasSubstr(R"("covariate":"predicted F","covariate_unit":"N")"));
+}
+
 TEST_F(ExplainTable, ConstantOrEmptyResponsesAreRefused) {
   write_table([](double) { return "5"; });
   ASSERT_EQ(import_table().code, 0);
