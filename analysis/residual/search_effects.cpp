@@ -49,8 +49,8 @@ bool Search::already_in(const Term& way, const MeanModel& model) {
   return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
     const bool another_axis = way.effect->name == "crosstalk" && term.effect != way.effect;
     const bool another_step =
-        way.effect->has_change_point() &&
-        !std::equal(way.parameters.begin() + 1, way.parameters.end(), term.parameters.begin() + 1);
+        way.effect->has_change_point() && !std::equal(way.parameters.begin() + 1, way.parameters.end(),
+                                                      term.parameters.begin() + 1, term.parameters.end());
     return term.effect->name == way.effect->name && !another_axis && !another_step &&
            (term.rotor == way.rotor || way.rotor < 0) && term.other == way.other;
   });
