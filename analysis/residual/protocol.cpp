@@ -40,7 +40,7 @@ double rms(const MatrixXd& errors) {
 bool speak_against(const HeldOutErrors& with, const HeldOutErrors& without) {
   constexpr double kClearly = 2;  // standard errors, by runs
   const MatrixXd squares = with.error.array().square() - without.error.array().square();
-  const VectorXd of_runs = squares.array().isNaN().select(0, squares).rowwise().sum();
+  const Eigen::VectorXd of_runs = squares.array().isNaN().select(0, squares).rowwise().sum();
   return of_runs.sum() > kClearly * of_runs.norm() && rms(with.error) > rms(with.expected_std);
 }
 

@@ -50,7 +50,7 @@ std::string files_of(const std::filesystem::path& folder) {
     if (entry.is_regular_file()) texts[entry.path().lexically_relative(folder)] = read_text(entry.path());
   }
   std::string all;
-  for (const auto& [name, text] : texts) all += name + "\n" + text;
+  for (const auto& [name, text] : texts) all.append(name).append("\n").append(text);
   return all;
 }
 
