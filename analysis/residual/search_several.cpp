@@ -76,6 +76,18 @@ std::vector<Term> Search::needed_of(std::vector<Term> terms) const {
   return terms;
 }
 
+bool Search::may_be_another(const std::vector<Term>& terms, const std::vector<Term>& left_out) const {
+  constexpr double kTold = 3;  // log-likelihood: odds of 20
+  const double all = fit_with_all(terms).variances.log_likelihood;
+  for (const Term& other : left_out)
+    for (std::size_t t = 0; t < terms.size(); ++t) {
+      std::vector<Term> instead = terms;
+      instead[t] = other;
+      if (fit_with_all(instead).variances.log_likelihood > all - kTold) return true;
+    }
+  return false;
+}
+
 bool Search::accept_together(const Scan& scan, std::size_t i, double p) {
   std::vector<Term> terms = {scan.ways[i]};
   const std::vector<Term>& others = scan.others.at(i);
@@ -83,10 +95,15 @@ bool Search::accept_together(const Scan& scan, std::size_t i, double p) {
   for (std::size_t t = 0; t < terms.size(); ++t)
     terms[t].parameters[0] = scan.fits[i].amplitude(static_cast<Index>(t));
   const bool pair = terms.size() == 2;
+  std::vector<Term> left_out = terms;
   terms = needed_of(std::move(terms));
+  std::erase_if(left_out, [&](const Term& term) {
+    return std::ranges::any_of(terms, [&](const Term& needed) { return needed.same_way(term); });
+  });
   if (terms.size() < 2 ||
       result_.accepted.size() + terms.size() > static_cast<std::size_t>(settings_.most_effects))
     return false;
+  if (!pair && may_be_another(terms, left_out)) return false;
   JointFit all = fit_with_all(terms);
   if (!all.at_bound.empty()) return false;
   const auto errors_of = [&](const JointFit& fit) {
