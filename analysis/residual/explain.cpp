@@ -9,9 +9,8 @@
 namespace tunnelrig {
 namespace {
 
-constexpr std::size_t kRowsPerGrossOne = 10;  // at most one row of ten is set aside
-constexpr std::size_t kRunsPerGross = 25;     // what touches more runs of a campaign is no slip of the hand
-constexpr int kMostSearches = 2;  // after the first, each without the gross rows of the one before
+constexpr std::size_t kRunsPerGross = 25;  // what touches more runs of a campaign is no slip of the hand
+constexpr int kMostSearches = 2;           // after the first, each without the gross rows of the one before
 
 std::vector<int> rows_but(const Observations& observations, const std::vector<SuspectRow>& left_out) {
   std::vector<int> rows;
@@ -30,7 +29,7 @@ struct SetAside {
   std::vector<SuspectRow> rows;
 
   explicit SetAside(const Observations& all)
-      : kept(all), most(all.name.size() / (all.from_table ? kRowsPerGrossOne : kRunsPerGross)) {}
+      : kept(all), most(all.name.size() / (all.from_table ? kRowsPerGross : kRunsPerGross)) {}
   std::size_t room() const { return most - std::min(most, rows.size()); }
   void take(const std::vector<SuspectRow>& gross) {
     kept = kept.subset(rows_but(kept, gross));

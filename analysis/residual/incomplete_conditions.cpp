@@ -26,7 +26,7 @@ std::vector<std::string> nearly_complete(const Observations& observations) {
 }
 
 /// The runs that have all of them, in which they are candidates. Nothing where a block has none left.
-Observations with_all(Observations observations, const std::vector<std::string>& names) {
+Observations with_all(const Observations& observations, const std::vector<std::string>& names) {
   std::vector<int> rows;
   std::set<int> blocks;
   for (const int row : observations.all_rows()) {
@@ -37,9 +37,9 @@ Observations with_all(Observations observations, const std::vector<std::string>&
     blocks.insert(observations.block[static_cast<std::size_t>(row)]);
   }
   if (static_cast<int>(blocks.size()) < observations.blocks()) rows.clear();
-  observations = observations.subset(rows);
-  for (const std::string& name : names) observations.not_usable.erase(name);
-  return observations;
+  Observations complete = observations.subset(rows);
+  for (const std::string& name : names) complete.not_usable.erase(name);
+  return complete;
 }
 
 bool needs_one_of(const AdoptedEffect& adopted, const std::vector<std::string>& names) {

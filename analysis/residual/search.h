@@ -98,8 +98,9 @@ class Search {
   JointFit fit_with_all(const std::vector<Term>& terms) const;
   /// Those that are there beside the others.
   std::vector<Term> needed_of(std::vector<Term> terms) const;
-  /// Whether one of those that were left out does about as well in place of another.
-  bool may_be_another(const std::vector<Term>& terms, const std::vector<Term>& left_out) const;
+  /// Whether one of those that were left out does about as well in place of another. `all`: the terms' fit.
+  bool may_be_another(const std::vector<Term>& terms, const std::vector<Term>& left_out,
+                      const JointFit& all) const;
   bool accept_together(const Scan& scan, std::size_t i, double p);
   /// Whether a course that is straight or bends once over the order of runs does as well as the step.
   bool is_gradual(const std::vector<Term>& steps, const NullFit& variances,

@@ -76,14 +76,14 @@ std::vector<Term> Search::needed_of(std::vector<Term> terms) const {
   return terms;
 }
 
-bool Search::may_be_another(const std::vector<Term>& terms, const std::vector<Term>& left_out) const {
+bool Search::may_be_another(const std::vector<Term>& terms, const std::vector<Term>& left_out,
+                            const JointFit& all) const {
   constexpr double kTold = 3;  // log-likelihood: odds of 20
-  const double all = fit_with_all(terms).variances.log_likelihood;
   for (const Term& other : left_out)
     for (std::size_t t = 0; t < terms.size(); ++t) {
       std::vector<Term> instead = terms;
       instead[t] = other;
-      if (fit_with_all(instead).variances.log_likelihood > all - kTold) return true;
+      if (fit_with_all(instead).variances.log_likelihood > all.variances.log_likelihood - kTold) return true;
     }
   return false;
 }
@@ -103,9 +103,8 @@ bool Search::accept_together(const Scan& scan, std::size_t i, double p) {
   if (terms.size() < 2 ||
       result_.accepted.size() + terms.size() > static_cast<std::size_t>(settings_.most_effects))
     return false;
-  if (!pair && may_be_another(terms, left_out)) return false;
   JointFit all = fit_with_all(terms);
-  if (!all.at_bound.empty()) return false;
+  if (!all.at_bound.empty() || (!pair && may_be_another(terms, left_out, all))) return false;
   const auto errors_of = [&](const JointFit& fit) {
     return cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns, all.variances,
                           rows_);

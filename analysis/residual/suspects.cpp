@@ -57,7 +57,7 @@ double sigma_by_median(const VectorXd& sizes) {
 VectorXd distance_of_those_apart(const Observations& observations, const std::vector<int>& rows,
                                  const VectorXd& residual) {
   constexpr double kFar = 10, kGap = 2;
-  constexpr std::size_t kFewestOfGroup = 5, kRowsPerGross = 10;
+  constexpr std::size_t kFewestOfGroup = 5;
   std::map<int, std::vector<Index>> groups;
   for (Index r = 0; r < residual.size(); ++r)
     if (std::isfinite(residual(r)))

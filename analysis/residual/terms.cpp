@@ -202,14 +202,19 @@ bool forces_differ(const Observations& observations) {
   return variance > least * variance_of_constants(observations, predicted).sum();
 }
 
+/// Whether the response is a thrust that its measured speed, and the density of its air, make C_T; another
+/// coefficient came as one.
+bool is_made_c_t(const Observations& observations) {
+  return observations.coefficient && !observations.of_air;
+}
+
 /// Whether a constant error is another share of each row's force: where that goes with the measured speed,
 /// and the baseline is no line or power law, which would take it up.
 bool shows_zero_offset(const Observations& observations) {
-  const bool made_c_t = observations.coefficient && !observations.of_air;
   const bool thrust =
       observations.of_air && !observations.coefficient && observations.find("speed_rpm") != nullptr;
   return observations.from_table && observations.multiplicative && observations.baseline_over.empty() &&
-         (made_c_t || thrust);
+         (is_made_c_t(observations) || thrust);
 }
 
 }  // namespace
@@ -272,8 +277,7 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason =
         "only a table's thrust, coefficient, power or torque is held against a baseline without the density "
         "of its air";
-  if (effect.name == "air_pressure" && observations.from_table && observations.coefficient &&
-      !observations.of_air)
+  if (effect.name == "air_pressure" && is_made_c_t(observations))
     result.reason = "the pressure is in the density that thrusts are divided by";
   if (effect.scope == EffectScope::kPair && observations.channels() < 2)
     result.reason = "the response has one channel";
@@ -284,7 +288,7 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason = "the response has one sign";
   if (observations.coefficient && effect.name == "rotor_speed")
     result.reason = "the measured speed is part of the response";
-  if (observations.coefficient && observations.of_air &&
+  if (observations.coefficient && !is_made_c_t(observations) &&
       (effect.name == "nonlinearity" || effect.name == "bidirectional"))
     result.reason = "a coefficient is no force that a cell has read";
   if (effect.name == "zero_offset" && !shows_zero_offset(observations))
