@@ -52,7 +52,8 @@ std::vector<const Covariate*> conditions_of(const Observations& observations, co
   std::vector<const Covariate*> result;
   for (const std::string& name : names) {
     const Covariate* covariate = observations.find(name);
-    const bool can_be_set = covariate != nullptr && !covariate->derived && !covariate->per_channel();
+    const bool can_be_set = covariate != nullptr && !covariate->derived && !covariate->per_channel() &&
+                            name != "run_order";  // what comes next has the next number
     if (can_be_set && !covariate->value.array().isNaN().any()) result.push_back(covariate);
   }
   if (result.size() > kMostConditions) result.resize(kMostConditions);

@@ -118,6 +118,8 @@ TEST_F(Steps, OneInTheMidstOfATablesBlockIsPlacedThere) {
                          "meaning = \"thrust_N\"\n[[covariates]]\ncolumn = \"run_order\"\nunit = \"1\"\n"));
   ASSERT_EQ(e.adopted.size(), 1u) << explanation_text(e);
   EXPECT_EQ(e.adopted[0].parameters[1].value, 63);
+  EXPECT_EQ(e.adopted[0].confounded_with.size(), 1u) << "a step in zero or in gain: all runs have one force";
+  EXPECT_FALSE(e.adopted[0].separating_run) << "nobody can set the number of a run";
   EXPECT_TRUE(e.suspect_rows.empty());
 }
 
