@@ -12,6 +12,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+constexpr double kLeastSeen = 1e-6;  // of a column: below it what is left is rounding
+
+}  // namespace
+
 std::vector<GroupEstimate> estimate_by_group(const Observations& observations, const MeanModel& model,
                                              std::size_t t, const std::vector<int>& rows) {
   const auto own_amplitudes = [&](std::size_t end) {
@@ -29,16 +35,20 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
     const MatrixXd slopes = observations.slopes(own, Eigen::all);
     const MatrixXd x = slopes.rowwise() - slopes.colwise().mean();
     const VectorXd y = response.array() - response.mean();
-    const Index dof = y.size() - 1 - x.cols();
-    if (dof < 1 || !(x.col(column).squaredNorm() > 0)) continue;
-    const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(x);
-    const VectorXd amplitude = solver.solve(y);
-    const double variance = (y - x * amplitude).squaredNorm() / static_cast<double>(dof);
-    const MatrixXd inverse = solver.pseudoInverse();
-    const double half = student_t_quantile(0.975, static_cast<double>(dof)) *
-                        std::sqrt(variance * inverse.row(column).squaredNorm());
-    result.push_back({observations.group_name[static_cast<std::size_t>(group)], amplitude(column),
-                      amplitude(column) - half, amplitude(column) + half});
+    MatrixXd others = x;
+    others.col(column).setZero();
+    // What the group's other columns make of both is no part of the amplitude (Frisch & Waugh 1933).
+    const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(others);
+    const VectorXd seen = x.col(column) - others * solver.solve(x.col(column));
+    const VectorXd rest = y - others * solver.solve(y);
+    const Index dof = y.size() - 2 - solver.rank();
+    if (dof < 1 || !(seen.norm() > kLeastSeen * x.col(column).norm())) continue;
+    const double amplitude = seen.dot(rest) / seen.squaredNorm();
+    const double variance = (rest - amplitude * seen).squaredNorm() / static_cast<double>(dof);
+    const double half =
+        student_t_quantile(0.975, static_cast<double>(dof)) * std::sqrt(variance / seen.squaredNorm());
+    result.push_back({observations.group_name[static_cast<std::size_t>(group)], amplitude, amplitude - half,
+                      amplitude + half});
   }
   return result;
 }

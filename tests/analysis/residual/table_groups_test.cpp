@@ -92,6 +92,32 @@ TEST_F(TablesTest, GroupsWithExponentsOfTheirOwnAreTold) {
   EXPECT_GT(fitted2, 100 * after2);
 }
 
+/// A moment that is always the force times one arm is in the line of that group, whatever it leaks.
+TEST_F(TablesTest, AGroupWhoseLineAbsorbsTheEffectHasNoAmplitude) {
+  constexpr std::array<double, 3> kLeak = {0.2, 0.25, 0.22};
+  std::string csv = "mount,fx,my,y\n";
+  for (std::size_t mount = 0; mount < kLeak.size(); ++mount)
+    for (int r = 0; r < 24; ++r) {
+      const double fx = 20 * even(random), my = mount == 2 ? 0.15 * fx : 3 * even(random);
+      csv += fmt::format("m{},{},{},{}\n", mount, fx, my, fx + kLeak[mount] * my + 0.01 * scatter(random));
+    }
+  const Observations o = observed(csv,
+                                  "groups = [\"mount\"]\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+                                  "[[covariates]]\ncolumn = \"fx\"\nunit = \"N\"\n"
+                                  "[[covariates]]\ncolumn = \"my\"\nunit = \"N m\"\n",
+                                  "linear:fx");
+  const TableEffects effects(o, test::every_effect());
+  const Explanation e = explain(o, effects.all, test::quick());
+  ASSERT_EQ(names(e), "crosstalk ") << explanation_text(e);
+  const auto& groups = e.adopted[0].parameters[0].groups;
+  ASSERT_EQ(groups.size(), 2u);
+  for (std::size_t mount = 0; mount < 2; ++mount) {
+    EXPECT_EQ(groups[mount].group, fmt::format("m{}", mount));
+    EXPECT_LE(groups[mount].low, kLeak[mount] + 0.01);
+    EXPECT_GE(groups[mount].high, kLeak[mount] - 0.01);
+  }
+}
+
 /// Lines of 24 groups, which are the blocks too: of a held-out group the slope is as unknown as the constant.
 TEST_F(TablesTest, HeldOutGroupsHaveSlopesOfTheirOwn) {
   std::string csv = "g,x,y\n";
