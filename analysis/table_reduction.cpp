@@ -2,6 +2,7 @@
 
 #include "analysis/air.h"
 #include "analysis/maps/gnuplot.h"
+#include "analysis/resting_speed.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -66,14 +67,6 @@ void finish_group(TableReduction& reduction, TableGroup& group) {
   group.at_highest = reduction.rows[group.rows.back()].c_t;
 }
 
-/// The highest speed of each group.
-std::map<std::string, double> highest_speeds(const ObservationTable& table) {
-  std::map<std::string, double> highest;
-  for (const Observation& row : table.rows)
-    highest[row.group] = std::max(highest[row.group], row.speed_rpm.value_or(0));
-  return highest;
-}
-
 std::string quoted(std::string text) {
   std::replace(text.begin(), text.end(), '"', '\'');
   return '"' + text + '"';
@@ -116,12 +109,11 @@ TableReduction reduce_table_rows(const ObservationTable& table, Convention conve
                          table.schema.response.column);
   }
   TableReduction reduction{.name = table.schema.name, .convention = convention, .rows = {}, .groups = {}};
-  constexpr double kAtRest = 0.05;
   std::map<std::string, std::size_t> groups;
-  std::map<std::string, double> highest = highest_speeds(table);
+  const std::map<std::string, double> resting = resting_speeds_rpm(table);
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
     const Observation& row = table.rows[i];
-    if (row.speed_rpm && *row.speed_rpm <= kAtRest * highest[row.group]) {
+    if (row.speed_rpm && *row.speed_rpm <= resting.at(row.group)) {
       ++reduction.at_rest;
       continue;
     }

@@ -40,8 +40,8 @@ struct TableReduction {
 };
 
 /// C_T of every row: from its thrust, speed, diameter and air, or converted from the coefficient that the
-/// table holds. Of one rotor. A speed below 5 % of its group's highest is a motor at rest. Throws InputError
-/// where the response is neither, or where no row can be reduced.
+/// table holds. Of one rotor. Of motors at rest, see resting_speed.h. Throws InputError where the response is
+/// neither, or where no row can be reduced.
 TableReduction reduce_table_rows(const ObservationTable& table, Convention convention);
 
 std::string observations_csv(const TableReduction& reduction);

@@ -13,7 +13,7 @@ constexpr double kGravity = 9.80665;   // m/s², standard
 constexpr double kPound = 0.45359237;  // kg
 constexpr double kPi = std::numbers::pi;
 
-constexpr std::array<Unit, 93> kUnits = {{
+constexpr std::array<Unit, 94> kUnits = {{
     {"1", "number", 1, 0},
     {"", "number", 1, 0},
     {kTextUnit, "text", 1, 0},
@@ -56,6 +56,7 @@ constexpr std::array<Unit, 93> kUnits = {{
     {"bar", "pressure", 1e5, 0},
     {"atm", "pressure", 101325, 0},
     {"mmHg", "pressure", 133.322387415, 0},
+    {"Torr", "pressure", 101325.0 / 760, 0},
     {"psi", "pressure", 6894.757293168, 0},
     {"inHg", "pressure", 3386.389, 0},
     {"kg/m3", "density", 1, 0},

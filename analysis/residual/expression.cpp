@@ -87,7 +87,10 @@ Expression::Expression(std::string_view text, const std::string& file) : parser_
     parser_->parser.Eval();
     for (const double& value : parser_->values) names_.push_back(by_address[&value]);
   } catch (const mu::Parser::exception_type& error) {
-    throw InputError::in(file, "{} is no expression: {}", text, error.GetMsg());
+    throw InputError::in(
+        file,
+        "{} is no expression: {} (a name that is not all letters, digits and _ stands in single quotes)",
+        text, error.GetMsg());
   }
 }
 

@@ -224,18 +224,24 @@ void check_groups(const TableSchema& schema, const Observations& result) {
                        fmt::join(schema.groups, "\", \""));
 }
 
-/// Columns of the same quantity as the baseline's, for crosstalk; forces and torques are loads alike.
+/// What a column is an axis of: "load", forces and torques alike, or the unit of a sensor's channels. Empty:
+/// of nothing. What one throttle, current or pressure does beside another is no crosstalk.
+std::string axis_kind(const TableColumn& column) {
+  const std::string_view quantity = unit_from_name(column.unit).quantity;
+  if (quantity == "force" || quantity == "torque") return "load";
+  const bool channel = quantity == "voltage" || quantity == "voltage ratio" || column.unit == "counts";
+  return channel && column.meaning.empty() ? std::string(quantity) : "";
+}
+
+/// Columns of the same kind as the baseline's, for crosstalk.
 void set_other_axes(const TableSchema& schema, const std::string& baseline, Observations& result) {
-  const auto quantity_of = [](const TableColumn& column) {
-    const std::string_view quantity = unit_from_name(column.unit).quantity;
-    return quantity == "torque" ? "force" : quantity;
-  };
   // A load that is the baseline need not be a covariate: the others' unit says what it is.
-  std::string_view quantity = "force";
+  std::string kind = "load";
   for (const TableColumn& column : schema.covariates)
-    if (column.column == baseline) quantity = quantity_of(column);
+    if (column.column == baseline) kind = axis_kind(column);
   for (const TableColumn& column : schema.covariates)
-    if (column.column != baseline && column.column != result.response && quantity_of(column) == quantity)
+    if (!kind.empty() && column.column != baseline && column.column != result.response &&
+        axis_kind(column) == kind)
       result.other_axes.push_back(column.name());
 }
 

@@ -92,12 +92,12 @@ void Search::take(InGroups own) {
 }
 
 void Search::let_groups_differ(bool before_others) {
-  if (observations_.channels() > 1 || observations_.groups() < 2 || result_.accepted.empty() ||
-      result_.accepted.back().term.per_group)
-    return;
+  if (observations_.channels() > 1 || observations_.groups() < 2 || result_.accepted.empty()) return;
+  const Term& newest = result_.accepted.back().term;
+  if (newest.per_group || newest.effect->theory_only) return;
   MeanModel others = fit_.model;
   others.terms.pop_back();
-  InGroups own = fit_in_groups(result_.accepted.back().term, std::move(others));
+  InGroups own = fit_in_groups(newest, std::move(others));
   const auto before = sum_of_squares(observations_, fit_), after = sum_of_squares(own.observations, own.fit);
   const double more = before.second - after.second;
   if (more <= 0 || after.second <= 0) return;

@@ -1,11 +1,14 @@
 #include "analysis/residual/table_source.h"
 
+#include "analysis/resting_speed.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace tunnelrig {
 
@@ -45,32 +48,42 @@ bool is_reduced(const ObservationTable& table, const ObservationChoice& choice) 
                              [](const Observation& row) { return row.speed_rpm.value_or(0) > 0; });
 }
 
+namespace {
+
+/// Their places, as many as anybody reads.
+std::string first_few(const std::vector<std::string>& rows) {
+  constexpr std::size_t kNamed = 4;
+  const auto end = rows.begin() + static_cast<std::ptrdiff_t>(std::min(rows.size(), kNamed));
+  return fmt::format(", {}{}", fmt::join(rows.begin(), end, ", "), rows.size() > kNamed ? " …" : "");
+}
+
+}  // namespace
+
 TableSource used_rows(const ObservationTable& table, const ObservationChoice& choice, Observations& result) {
-  constexpr double kAtRest = 0.05;  // of a group's highest speed
-  std::map<std::string, double> highest;
-  for (const Observation& row : table.rows)
-    highest[row.group] = std::max(highest[row.group], row.speed_rpm.value_or(0));
+  const std::map<std::string, double> at_rest = resting_speeds_rpm(table);
   const bool reduced = is_reduced(table, choice);
   TableSource source{table, {}};
-  int resting = 0, without_speed = 0, without_air = 0;
+  std::vector<std::string> resting, without_speed, without_air;
   for (std::size_t r = 0; r < table.rows.size(); ++r) {
     const Observation& row = table.rows[r];
-    const double fastest = highest[row.group];
-    if (reduced && (!row.speed_rpm || fastest == 0))
-      ++without_speed;
-    else if (row.speed_rpm && fastest > 0 && *row.speed_rpm <= kAtRest * fastest)
-      ++resting;
+    const double rest_rpm = at_rest.at(row.group);
+    if (reduced && (!row.speed_rpm || rest_rpm == 0))
+      without_speed.push_back(row.place);
+    else if (row.speed_rpm && rest_rpm > 0 && *row.speed_rpm <= rest_rpm)
+      resting.push_back(row.place);
     else if (reduced && (std::isnan(row.air_temperature_C) || std::isnan(row.air_pressure_Pa)))
-      ++without_air;
+      without_air.push_back(row.place);
     else
       source.rows.push_back(r);
   }
-  if (resting > 0) result.left_out.push_back(fmt::format("{} rows: the motor stood", resting));
-  if (without_speed > 0)
-    result.left_out.push_back(fmt::format("{} rows: no speed was read, so they have no C_T", without_speed));
-  if (without_air > 0)
-    result.left_out.push_back(fmt::format(
-        "{} rows: the temperature or the pressure of the air is empty, so they have no C_T", without_air));
+  const auto say = [&](const std::vector<std::string>& rows, const char* why) {
+    if (rows.empty()) return;
+    result.left_out.push_back(fmt::format("{} {}: {}", rows.size(), rows.size() == 1 ? "row" : "rows", why) +
+                              first_few(rows));
+  };
+  say(resting, "the motor stood or its speed was not read (at most 5 % of what its group runs at)");
+  say(without_speed, "no speed was read, so there is no C_T");
+  say(without_air, "the temperature or the pressure of the air is empty, so there is no C_T");
   return source;
 }
 
