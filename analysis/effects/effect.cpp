@@ -9,6 +9,10 @@ bool Effect::within_time() const {
                      [](const std::string& column) { return column == "time_since_motor_start_s"; });
 }
 
+std::string Effect::cause() const {
+  return name == "crosstalk" && !form.empty() ? name + " (" + form + ")" : name;
+}
+
 bool Effect::has_change_point() const {
   return std::any_of(parameters.begin(), parameters.end(), [](const EffectParameter& parameter) {
     return parameter.role == ParameterRole::kChangePoint;

@@ -71,6 +71,8 @@ struct Effect {
 
   bool within_time() const;       // changes within a run
   bool has_change_point() const;  // begins at some run
+  /// What it says the cause is: its name, whatever its form; of a table's other axes the axis as well.
+  std::string cause() const;
   std::optional<double> theory() const { return parameters[0].theory; }
 };
 

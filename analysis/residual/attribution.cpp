@@ -44,7 +44,8 @@ void Search::begin() {
   const OwnEvidence has_evidence(observations_, *baseline_);
   const auto taken_back = [&](const Term& way) {
     return std::ranges::any_of(settings_.taken_back, [&](const Term& term) {
-      return term.effect->name == way.effect->name && term.rotor == way.rotor && term.other == way.other;
+      return term.effect->cause() == way.effect->cause() && term.rotor == way.rotor &&
+             term.other == way.other;
     });
   };
   std::erase_if(ways_, [&](const Term& way) { return taken_back(way) || !has_evidence(way); });

@@ -68,7 +68,8 @@ std::string unseen(const Observations& observations, const Covariate& covariate,
                    bool named) {
   const bool texts = !covariate.labels.empty(), table = observations.from_table;
   const int values = different_values(covariate, rows);
-  if (values == 1) return texts ? "" : fmt::format("is the same in every {}", table ? "row" : "run");
+  if (values == 1 || is_constant(covariate))
+    return texts ? "" : fmt::format("is the same in every {}", table ? "row" : "run");
   if (!varies_within_groups(observations, covariate))
     return fmt::format("does not vary within any {}", table ? "group" : "location");
   if ((texts || (values == 2 && !named)) && levels_of(observations, covariate, rows).empty())

@@ -85,9 +85,11 @@ int places_on_range(const Covariate& covariate, const std::vector<int>& rows) {
   for (const int row : rows) values.insert(covariate.value(row, 0));
   const double range = *values.rbegin() - *values.begin();
   int count = 0;
-  for (auto next = values.begin(); next != values.end(); next = values.lower_bound(*next + kApart * range)) {
+  auto next = values.begin();
+  while (next != values.end()) {
     ++count;
-    if (!(range > 0)) break;
+    const auto apart = values.lower_bound(*next + kApart * range);
+    next = apart == next ? std::next(next) : apart;
   }
   return count;
 }
@@ -207,7 +209,13 @@ const Covariate* number_of_texts(const Observations& observations, const Covaria
 
 bool can_be_followed(const Observations& observations, const Covariate& covariate) {
   return !observations.not_usable.contains(covariate.name) && covariate.value.allFinite() &&
-         covariate.value.maxCoeff() > covariate.value.minCoeff();
+         !is_constant(covariate);
+}
+
+bool is_constant(const Covariate& covariate) {
+  constexpr double kRounding = 1e-9;  // of the values: a range that is no more is none
+  const double range = covariate.value.maxCoeff() - covariate.value.minCoeff();
+  return range <= kRounding * covariate.value.cwiseAbs().maxCoeff();
 }
 
 double share_beside_cubics(const Observations& observations, const std::vector<int>& rows,

@@ -48,6 +48,9 @@ double correlation(const Covariate& first, const Covariate& second);
 /// with the texts is told by it. Null where there is none.
 const Covariate* number_of_texts(const Observations& observations, const Covariate& texts);
 
+/// Whether all runs have one value, but for the rounding of what wrote it.
+bool is_constant(const Covariate& covariate);
+
 /// Numbers that differ between the runs.
 bool can_be_followed(const Observations& observations, const Covariate& covariate);
 

@@ -8,14 +8,18 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <stdexcept>
+
+#include <fmt/format.h>
 
 namespace tunnelrig {
 namespace {
 
 using Eigen::Index;
 
-/// Adopted columns and a candidate's together.
-constexpr int kMostColumns = 24;
+/// Adopted columns and a candidate's together: 12 effects (--max-effects), three curves of 11 columns, and an
+/// amplitude of each of 24 groups, or as many axes. Matrices on the stack make the scan half as fast again.
+constexpr int kMostColumns = 96;
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostColumns, 1>;
 
@@ -36,7 +40,11 @@ struct CandidateScan::Impl {
         candidates(all),
         adopted(static_cast<Index>(adopted_columns.size())),
         columns(m, adopted_columns, candidates) {
-    for (std::size_t i = 0; i < candidates.size(); ++i) table_of.push_back(table_for(i));
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      if (adopted + static_cast<Index>(candidates[i].columns.size()) > kMostColumns)
+        throw std::length_error(fmt::format("a model of more than {} columns", kMostColumns));
+      table_of.push_back(table_for(i));
+    }
   }
 
   const EvidenceTable* table_for(std::size_t i) {

@@ -91,6 +91,7 @@ struct Observations {
       slopes;  // n × s: baseline columns beside the constants, with coefficients of each group's own
   std::vector<bool> in_tunnel;
   std::vector<int> previous;   // the run before in the same session, −1 for the first
+  Eigen::VectorXd position;    // n: what change-points are held against; empty: the row's place, from 0
   std::vector<bool> held_out;  // a table's hold_out expression; empty: seal blocks instead
   bool from_table = false, blocks_are_rows = false;
   bool coefficient = false;  // the response is a thrust coefficient, or is made one by its measured speed

@@ -117,6 +117,21 @@ void set_scale(Observations& result, bool alike) {
   }
 }
 
+/// By run_order, where every row has one: steps and what depends on the row before go by place.
+void sort_by_order(TableSource& source) {
+  for (const TableColumn& column : source.table.schema.covariates) {
+    if (column.name() != "run_order") continue;
+    std::map<std::size_t, double> number;
+    for (const std::size_t row : source.rows) {
+      const auto value = source.table.sheet.number(row, column.column);
+      if (!value) return;
+      number[row] = *value;
+    }
+    std::stable_sort(source.rows.begin(), source.rows.end(),
+                     [&](std::size_t a, std::size_t b) { return number[a] < number[b]; });
+  }
+}
+
 int index_in(std::map<std::string, int>& known, std::vector<std::string>& names, const std::string& name) {
   const auto [found, fresh] = known.emplace(name, static_cast<int>(names.size()));
   if (fresh) names.push_back(name);
@@ -269,19 +284,12 @@ std::string keep_as_covariate(const TableSource& source, const std::string& colu
 
 /// A table's rows have an order where a condition says so.
 void set_previous(Observations& result) {
-  const Covariate* order = result.find("run_order");
-  if (order == nullptr || result.not_usable.contains("run_order")) return;
-  std::vector<Index> rows(result.group.size());
-  std::iota(rows.begin(), rows.end(), Index{0});
-  std::stable_sort(rows.begin(), rows.end(),
-                   [&](Index a, Index b) { return order->value(a, 0) < order->value(b, 0); });
-  std::map<int, Index> last;  // of each block
-  for (const Index row : rows) {
-    const int block = result.blocks_are_rows ? 0 : result.block[static_cast<std::size_t>(row)];
-    const auto before = last.find(block);
-    if (before != last.end())
-      result.previous[static_cast<std::size_t>(row)] = static_cast<int>(before->second);
-    last[block] = row;
+  if (result.find("run_order") == nullptr || result.not_usable.contains("run_order")) return;
+  std::map<int, int> last;  // of each block
+  for (std::size_t row = 0; row < result.previous.size(); ++row) {
+    const int block = result.blocks_are_rows ? 0 : result.block[row];
+    if (const auto before = last.find(block); before != last.end()) result.previous[row] = before->second;
+    last[block] = static_cast<int>(row);
   }
 }
 
@@ -334,7 +342,8 @@ TableParts check_table(const ObservationTable& table) {
 Observations observe_table(const ObservationTable& table, const ObservationChoice& choice) {
   Observations result;
   result.campaign = table.schema.name;
-  const TableSource source = used_rows(table, choice, result);
+  TableSource source = used_rows(table, choice, result);
+  sort_by_order(source);
   set_belonging(source, result);
   check_groups(table.schema, result);
   set_response(source, choice, result);

@@ -116,7 +116,7 @@ void report_adopted(const Observations& observations, const Attribution& found, 
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k)
       adopted.parameters[k].unit = unit_of(observations, adopted.term.effect->parameters[k]);
     for (const Ranked& rival : accepted.confounded)
-      adopted.confounded_with.push_back(rival.term.effect->name);
+      adopted.confounded_with.push_back(rival.term.effect->cause());
     if (!accepted.confounded.empty())
       adopted.separating_run =
           separating_run(observations, accepted.term, accepted.confounded[0].term, found.final, rows);
@@ -160,6 +160,18 @@ void warn_of_doubts(Explanation& explanation) {
         fmt::format("on the sealed blocks the error after is {:.2g} times the noise floor: something varies "
                     "there that the model does not have",
                     explanation.after.held_out_rmse / explanation.noise_floor));
+}
+
+/// Change-points as the runs are numbered, where the search counted rows.
+void number_change_points(const Observations& observations, const std::vector<ChangePoint>& change_points,
+                          Explanation& explanation) {
+  const Covariate* order = observations.find("run_order");
+  if (order == nullptr) return;
+  for (const ChangePoint& point : change_points) {
+    ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
+    for (double* place : {&estimate.value, &estimate.low, &estimate.high})
+      *place = order->value(static_cast<Eigen::Index>(*place), 0);
+  }
 }
 
 std::string only_sealed_in_words(const std::vector<std::string>& groups) {
@@ -289,6 +301,7 @@ void estimate_on_all(const Models& models, const Seal& seal, const Observations&
       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
   warn_of_alike_rows(observations, explanation);
   warn_of_changes_at_steps(observations, explanation);
+  number_change_points(observations, change_points, explanation);
 }
 
 }  // namespace

@@ -45,6 +45,9 @@ class Search {
   // named effects: search_effects.cpp
   void add_effects();
   static bool already_in(const Term& way, const MeanModel& model);
+  /// Whether a step of the same rotors is nearer than a step may be to the campaign's ends: what lies between
+  /// is a few runs.
+  bool is_beside_a_step(const Term& way, const MeanModel& model) const;
   /// All candidates on top of a model, but for what it has, with one amplitude for all groups.
   Scan scan_effects(const JointFit& base) const;
   /// And with an amplitude of each group's own.

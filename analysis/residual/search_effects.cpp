@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -56,6 +57,26 @@ bool Search::already_in(const Term& way, const MeanModel& model) {
   });
 }
 
+bool Search::is_beside_a_step(const Term& way, const MeanModel& model) const {
+  if (!way.effect->has_change_point()) return false;
+  const auto first_run = [](const Term& term) {
+    std::size_t k = 1;
+    while (term.effect->parameters[k].role != ParameterRole::kChangePoint) ++k;
+    return static_cast<int>(term.parameters[k]);
+  };
+  const int at = first_run(way);
+  return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
+    if (!term.effect->has_change_point() || (way.rotor >= 0 && term.rotor >= 0 && way.rotor != term.rotor))
+      return false;
+    const int other = first_run(term);
+    std::set<int> between;
+    for (const int row : rows_)
+      if (row >= std::min(at, other) && row < std::max(at, other))
+        between.insert(observations_.block[static_cast<std::size_t>(row)]);
+    return other != at && static_cast<int>(between.size()) < kLeastBlocksBesideAStep;
+  });
+}
+
 Search::Scan Search::scan_effects(const JointFit& base) const {
   Scan scan = list_effects(base);
   rank(base, scan);
@@ -66,7 +87,7 @@ Search::Scan Search::list_effects(const JointFit& base) const {
   Scan scan;
   const Eigen::MatrixXd predicted = predict_response(observations_, base.model, rows_);
   for (const Term& way : ways_) {
-    if (already_in(way, base.model) || is_work_of_a_curve(way)) continue;
+    if (already_in(way, base.model) || is_beside_a_step(way, base.model) || is_work_of_a_curve(way)) continue;
     Candidate candidate = candidate_of(way, predicted);
     if (!mixed_->sees(candidate.columns[0])) continue;
     scan.ways.push_back(way);
@@ -260,9 +281,18 @@ void Search::swap_weaker() {
       fit_ = current;
       continue;
     }
+    NullMaxima maxima(*scan.scan, without.variances,
+                      sizes_beside(without, scan.candidates[best], scan.fits[best]), settings_, ++salt_);
+    const auto rmse_of = [&](const JointFit& fit) {
+      return cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns,
+                            fit.variances, rows_)
+          .rmse();
+    };
     fit_ = std::move(tried);
     const auto place = result_.accepted.begin() + static_cast<std::ptrdiff_t>(t);
     std::rotate(place, place + 1, result_.accepted.end());  // the new term is the model's last
+    result_.accepted.back().p = maxima.p(scan.fits[best].evidence);
+    result_.accepted.back().gain = rmse_of(without) - rmse_of(fit_);
     read_back_terms();
   }
 }

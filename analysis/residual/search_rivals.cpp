@@ -38,19 +38,19 @@ std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& wit
   };
   std::optional<CrossValidation> own;
   for (const std::size_t i : scan.order)
-    if (!own && scan.ways[i].effect->name == accepted.term.effect->name &&
+    if (!own && scan.ways[i].effect->cause() == accepted.term.effect->cause() &&
         scan.ways[i].rotor == accepted.term.rotor)
       own = validate(scan.ways[i], scan.candidates[i]);
   if (!own) return result;
-  std::vector<std::string> done = {accepted.term.effect->name};
+  std::vector<std::string> done = {accepted.term.effect->cause()};
   for (const std::size_t i : scan.order) {
     if (scan.fits[i].evidence < critical_) break;
-    const std::string& name = scan.ways[i].effect->name;
-    if (std::count(done.begin(), done.end(), name) >= 3) continue;  // three ways of each are tried
-    done.push_back(name);
-    if (name == accepted.term.effect->name) continue;
+    const std::string cause = scan.ways[i].effect->cause();
+    if (std::count(done.begin(), done.end(), cause) >= 3) continue;  // three ways of each are tried
+    done.push_back(cause);
+    if (cause == accepted.term.effect->cause()) continue;
     const bool listed = std::any_of(result.begin(), result.end(),
-                                    [&](const Ranked& r) { return r.term.effect->name == name; });
+                                    [&](const Ranked& r) { return r.term.effect->cause() == cause; });
     if (listed || (!scan.ways[i].effect->theory_only && !within_bounds(scan, i))) continue;
     if (compare(validate(scan.ways[i], scan.candidates[i]), *own).told_apart()) continue;
     Term term = scan.ways[i];
@@ -86,10 +86,10 @@ std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
   const Components y = difference(y_, fit_.linear.offset);
   const CrossValidation own = cross_validate(observations_, y, fit_.linear.columns, fit_.variances, rows_);
   for (const Term& way : ways_) {
-    const std::string& name = way.effect->name;
+    const std::string cause = way.effect->cause();
     const bool taken = already_in(way, fit_.model) ||
                        std::any_of(result.begin(), result.end(),
-                                   [&](const Ranked& r) { return r.term.effect->name == name; });
+                                   [&](const Ranked& r) { return r.term.effect->cause() == cause; });
     if (taken) continue;
     Observations other = observations_;
     other.slopes.col(place) = respond(way, observations_, predicted).derivative[0][0];

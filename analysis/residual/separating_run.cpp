@@ -107,12 +107,12 @@ Observations imagined(const Observations& observations, const std::vector<Settin
   result.duration_s = VectorXd::Zero(static_cast<Index>(rows.size()));
   result.shape.clear();
   result.previous.assign(rows.size(), -1);
+  result.position =
+      VectorXd::Constant(static_cast<Index>(rows.size()), static_cast<double>(observations.rows()));
   result.in_tunnel.clear();
   for (const Setting& setting : settings) result.in_tunnel.push_back(setting.in_tunnel);
   for (Covariate& covariate : result.covariates) {
-    const double last = covariate.name == "run_order" ? covariate.value.maxCoeff() : 0;
     covariate.value = MatrixXd(covariate.value(rows, Eigen::all));
-    if (covariate.name == "run_order") covariate.value.setConstant(last);
     for (std::size_t s = 0; s < settings.size(); ++s)
       if (const auto set = settings[s].covariates.find(covariate.name); set != settings[s].covariates.end())
         covariate.value.row(static_cast<Index>(s)).setConstant(set->second);

@@ -20,7 +20,6 @@ using Eigen::VectorXd;
 
 /// Times within a run at which an effect that changes with time is evaluated.
 constexpr int kTimes = 32;
-constexpr int kLeastBlocksBesideAStep = 3;
 
 /// cos(π j (t + ½)/kTimes), j = 0 … kShapes, scaled to give mean and cosine coefficients.
 const MatrixXd& cosines() {
@@ -57,7 +56,10 @@ class Evaluation {
         observations_(observations),
         predicted_(predicted),
         reference_(reference_of(*term.effect, observations)) {
-    for (const std::string& name : term.effect->covariates) covariates_.push_back(observations.find(name));
+    for (const std::string& name : term.effect->covariates) {
+      covariates_.push_back(observations.find(name));
+      is_order_.push_back(name == "run_order" && term.effect->has_change_point());
+    }
     x_.resize(covariates_.size());
     for (std::size_t k = 0; k < term.parameters.size(); ++k) {
       parameters_[k] = EffectJet(term.parameters[k]);
@@ -98,7 +100,8 @@ class Evaluation {
   }
 
   Sample sample_of(Index row, Index channel) {
-    for (std::size_t k = 0; k < covariates_.size(); ++k) x_[k] = covariates_[k]->at(row, channel);
+    for (std::size_t k = 0; k < covariates_.size(); ++k)
+      x_[k] = is_order_[k] ? position(row) : covariates_[k]->at(row, channel);
     return {.x = x_,
             .reference = reference_,
             .previous_N = previous_force(row, channel),
@@ -107,6 +110,11 @@ class Evaluation {
             .newtons_per_volt =
                 channel < observations_.newtons_per_volt.size() ? observations_.newtons_per_volt(channel) : 1,
             .rig = &observations_.rig};
+  }
+
+  /// Change-points are places among the rows, whatever numbers the runs have and whichever are left out.
+  double position(Index row) const {
+    return observations_.position.size() > 0 ? observations_.position(row) : static_cast<double>(row);
   }
 
   bool at_the_same_place(Index row, int other) const {
@@ -152,6 +160,7 @@ class Evaluation {
   const MatrixXd& predicted_;
   std::vector<double> reference_;
   std::vector<const Covariate*> covariates_;
+  std::vector<bool> is_order_;  // of the rows
   std::vector<double> x_;
   EffectJet parameters_[kMaxEffectParameters];
   MatrixXd constant_variance_;  // n × c; of effects of the run before
@@ -181,7 +190,7 @@ std::vector<double> change_points(const Observations& observations, const std::v
       first.push_back(row);
     }
   }
-  if (blocks.size() < 2 * kLeastBlocksBesideAStep) return {};
+  if (static_cast<int>(blocks.size()) < 2 * kLeastBlocksBesideAStep) return {};
   std::vector<double> points{first.begin() + kLeastBlocksBesideAStep,
                              first.end() - kLeastBlocksBesideAStep + 1};
   std::erase_if(points, [&](double point) { return !is_within_a_group(observations, rows, point); });

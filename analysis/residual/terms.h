@@ -52,7 +52,10 @@ std::vector<Term> known_terms(const Observations& observations);
 /// The same of a table, whose baseline has no speed: what is expected to be found.
 std::vector<Term> terms_of_theory(const Observations& observations);
 
-/// All ways to try an effect: rotors, shapes on their grids, change-points with three of `open_blocks` on
+/// Blocks that a step leaves on either side.
+inline constexpr int kLeastBlocksBesideAStep = 3;
+
+/// All ways to try an effect: rotors, shapes on their grids, change-points with three blocks of `rows` on
 /// each side.
 std::vector<Term> ways_to_try(const Effect& effect, const Observations& observations,
                               const std::vector<int>& rows);

@@ -123,6 +123,26 @@ TEST_F(Steps, OneInTheMidstOfATablesBlockIsPlacedThere) {
   EXPECT_TRUE(e.suspect_rows.empty());
 }
 
+/// Whatever number the first run has, and in whatever order the file is written.
+TEST_F(Steps, ATablesRunsHaveAnyNumbers) {
+  for (const bool backwards : {false, true}) {
+    std::string csv = "b,run_order,y\n";
+    for (int i = 0; i < 120; ++i) {
+      const int r = backwards ? 119 - i : i;
+      csv += fmt::format("{},{},{}\n", r / 10, 1001 + 2 * r,
+                         (r < 60 ? 8 : 8.25) * (1 + 0.002 * scatter(random)));
+    }
+    const Explanation e =
+        explained(observed(csv,
+                           "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+                           "meaning = \"thrust_N\"\n[[covariates]]\ncolumn = \"run_order\"\nunit = \"1\"\n"));
+    ASSERT_EQ(e.adopted.size(), 1u) << explanation_text(e);
+    const ParameterEstimate& run = e.adopted[0].parameters[1];
+    EXPECT_EQ(run.value, 1121);
+    EXPECT_EQ(run.run, backwards ? "t.csv:61" : "t.csv:62");
+  }
+}
+
 /// No model of the open runs can know on which side of the step a sealed session between them lies.
 TEST_F(Steps, SealedRunsWhereItMayLieAreNotScored) {
   Observations o = ordered();

@@ -117,7 +117,8 @@ TEST_F(TableSourceTest, RowsWithoutAirHaveNoC_TAndItsPressureIsNotSoughtAgain) {
       "[[covariates]]\ncolumn = \"p\"\nunit = \"hPa\"\nmeaning = \"air_pressure_Pa\"\n";
   const Observations o = observed(csv, schema);
   EXPECT_EQ(o.rows(), 95);
-  EXPECT_THAT(o.left_out, ElementsAre(HasSubstr("1 row: the temperature or the pressure of the air is empty")));
+  EXPECT_THAT(o.left_out,
+              ElementsAre(HasSubstr("1 row: the temperature or the pressure of the air is empty")));
   EXPECT_THAT(testability(effect_named("air_pressure"), o).reason, HasSubstr("density"));
   EXPECT_EQ(explained(o).verdict, "no_structure");
   EXPECT_EQ(observed(csv, schema, "constant").rows(), 96);
