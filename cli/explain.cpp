@@ -9,6 +9,7 @@
 #include "datasets/error.h"
 #include "datasets/observations.h"
 
+#include <cmath>
 #include <memory>
 
 #include <fmt/format.h>
@@ -83,6 +84,11 @@ int run_explain(ExplainOptions options) {
   const TableEffects effects(observations, candidates.all);
   if (options.adopt) require_adoptable(observations);
   options.search.empirical = options.adopt_empirical;
+  if (const double most = static_cast<double>(options.search.simulations);
+      1 / (most + 1) > options.search.alpha)
+    throw InputError(fmt::format(
+        "--alpha {} needs --simulations {:.0f} at least: of {:.0f} none can be rarer than 1 in {:.0f}",
+        options.search.alpha, std::ceil(1 / options.search.alpha) - 1, most, most + 1));
   ProgressBar progress("explaining");
   double step = 0;
   options.search.progress = [&](const std::string& what) {
@@ -132,7 +138,9 @@ void add_explain(CLI::App& app, Work& work) {
   verb->add_option("--simulations", options->search.simulations, "Data sets without effect to compare with")
       ->check(CLI::Range(99, 99999))
       ->capture_default_str();
-  verb->add_option("--seed", options->search.seed, "Of seal and simulations")->capture_default_str();
+  verb->add_option("--seed", options->search.seed, "Of seal and simulations")
+      ->check(CLI::Range(0., 1e18))
+      ->capture_default_str();
   verb->add_option("--session-ratio", options->search.session_ratio,
                    "Session scatter over run scatter above which it is an unknown")
       ->check(CLI::Range(0.1, 7.0))

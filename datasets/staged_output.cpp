@@ -3,10 +3,10 @@
 #include "datasets/error.h"
 
 #include <cerrno>
+#include <cstdio>  // renameat2 as well
 #include <system_error>
 
 #include <fcntl.h>
-#include <stdio.h>
 #include <unistd.h>
 
 namespace tunnelrig {

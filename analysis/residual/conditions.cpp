@@ -1,6 +1,5 @@
 // What the conditions of the runs cannot show.
 #include "analysis/residual/explanation_parts.h"
-#include "analysis/residual/run_correlation.h"
 
 #include <algorithm>
 #include <array>
@@ -166,32 +165,6 @@ void warn_of_changes_at_steps(const Observations& observations, Explanation& exp
       }
 }
 
-void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
-                         Explanation& explanation) {
-  constexpr double kInstrument = 0.01;  // no tachometer scatters more
-  const Covariate* speed = observations.find("speed_rpm");
-  if (speed == nullptr || observations.from_table || speed->value.array().isNaN().any()) return;
-  const Eigen::ArrayXd log_speed = speed->value.col(0).array().log() - speed->value.array().log().mean();
-  for (const AdoptedEffect& adopted : explanation.adopted) {
-    const auto& names = adopted.term.effect->covariates;
-    if (adopted.term.effect->name == "rotor_speed" ||
-        std::find(names.begin(), names.end(), "speed_rpm") == names.end())
-      continue;
-    const Eigen::Index channel = std::max(adopted.term.rotor, 0);
-    const Eigen::ArrayXd change =
-        respond(adopted.term, observations, predicted).value[0].col(channel).array();
-    const double exponent = ((change - change.mean()) * log_speed).sum() / log_speed.square().sum();
-    const double share = -exponent / 2;  // of the readings' variance, which is scatter then
-    const double scatter_rpm =
-        std::sqrt(std::max(0.0, share) * (speed->value.array() - speed->value.mean()).square().mean());
-    if (share <= 0 || scatter_rpm > kInstrument * speed->value.mean()) continue;
-    explanation.warnings.push_back(fmt::format(
-        "{}: readings of speed_rpm that scatter by {:.2g} rev/min would look the same, since they make "
-        "the thrust depend less on what is read",
-        adopted.term.label(), scatter_rpm));
-  }
-}
-
 /// Of numbers that rows have: the names of those whose every row scatters more than most.
 std::vector<std::string> that_scatter(const Eigen::VectorXd& scatter, const std::vector<int>& number,
                                       const std::vector<std::string>& name) {
@@ -237,44 +210,6 @@ void warn_of_scatter(const Observations& observations, Explanation& explanation)
                     observations.channels() > 1 ? "runs" : "rows", correlation,
                     observations.channels() > 1 ? " of " : "", observations.channels() > 1 ? kOf[s] : ""));
   }
-}
-
-/// Whether most rows have the value of the row before them.
-bool is_shared_by_neighbours(const Covariate& covariate) {
-  Index shared = 0;
-  for (Index r = 1; r < covariate.value.rows(); ++r)
-    if (covariate.value(r, 0) == covariate.value(r - 1, 0)) ++shared;
-  return 2 * shared > covariate.value.rows() && shared + 1 < covariate.value.rows();
-}
-
-/// Days whose rows have one weather: what goes with the weather has as many independent values as there are
-/// days.
-void warn_of_shared_conditions(const Observations& observations, Explanation& explanation) {
-  std::set<std::string> names;
-  for (const AdoptedEffect& adopted : explanation.adopted)
-    names.insert(adopted.term.effect->covariates.begin(), adopted.term.effect->covariates.end());
-  for (const UnknownStructure& unknown : explanation.unknown) names.insert(unknown.condition);
-  for (const std::string& name : names)
-    if (const Covariate* covariate = observations.find(name);
-        covariate != nullptr && is_shared_by_neighbours(*covariate))
-      explanation.warnings.push_back(fmt::format(
-          "neighbouring rows share their {}, and are taken as independent: if they belong together (a day, a "
-          "set-up), give them a block (blocks = a column), or names and p may be wrong",
-          name));
-}
-
-void warn_of_alike_rows(const Observations& observations, Explanation& explanation) {
-  if (!observations.blocks_are_rows) return;
-  warn_of_shared_conditions(observations, explanation);
-  VectorXd residual = explanation.residual_after.col(0);
-  if (observations.multiplicative) residual = residual.array() / observations.value.col(0).array();
-  const double correlation = row_correlation(observations, observations.all_rows(), residual);
-  if (correlation == 0) return;
-  explanation.warnings.push_back(fmt::format(
-      "rows resemble the row before them (correlation {:.2f}) and are taken as independent: names and "
-      "p may be wrong; rows that belong together want a block of their own (blocks = a column, or "
-      "bins(column, n))",
-      correlation));
 }
 
 }  // namespace tunnelrig

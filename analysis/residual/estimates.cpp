@@ -29,7 +29,7 @@ void set_interval(const Observations& observations, const HeldOutErrors& errors,
   estimate.held_out_rmse =
       errors.count() == 0 ? 0 : std::sqrt(errors.sum_of_squares() / static_cast<double>(errors.count()));
   estimate.held_out_low = estimate.held_out_high = estimate.held_out_rmse;
-  if (blocks.size() < 2 || !(estimate.held_out_rmse > 0)) return;
+  if (!(estimate.held_out_rmse > 0)) return;
   std::vector<std::pair<double, double>> list;
   for (const auto& [id, block] : blocks) list.push_back(block);
   std::mt19937_64 random(seed);
@@ -49,8 +49,9 @@ void set_interval(const Observations& observations, const HeldOutErrors& errors,
   }
   const double n = static_cast<double>(list.size());
   // The bootstrap's variance of a mean is short by (n − 1)/n.
+  // Of one block nothing is known of how blocks differ: what is left is the least, below.
   const double variance =
-      std::max(0.0, squares / kResamples - sum * sum / kResamples / kResamples) * n / (n - 1);
+      n < 2 ? 0 : std::max(0.0, squares / kResamples - sum * sum / kResamples / kResamples) * n / (n - 1);
   // Runs scatter within blocks too: no estimate from N errors is better than 1/(2N) of its square.
   const double least = 1 / (2.0 * static_cast<double>(errors.count()));
   const double half = student_t_quantile(0.975, std::max(n - 1, 3.0)) * std::sqrt(std::max(variance, least));
@@ -106,6 +107,25 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
   return result;
 }
 
+namespace {
+
+/// Of n sorted values, how many lie on either side of the narrowest interval between two of them that holds
+/// the median with 95 %: each value is below it or above as a coin falls (David & Nagaraja, Order Statistics,
+/// 2003).
+std::size_t outside_median_interval(std::size_t n) {
+  constexpr double kBeyond = 0.025;
+  double tail = std::pow(0.5, static_cast<double>(n)), term = tail;  // P(at most k of n)
+  std::size_t k = 0;
+  while (tail <= kBeyond) {
+    ++k;
+    term *= static_cast<double>(n - k + 1) / static_cast<double>(k);
+    tail += term;
+  }
+  return k > 0 ? k - 1 : 0;
+}
+
+}  // namespace
+
 ParameterEstimate summary_of_groups(const EffectParameter& parameter, std::vector<GroupEstimate> groups) {
   constexpr std::size_t kFewestForOrder = 6;  // the median of fewer lies outside their range too often
   ParameterEstimate result{.name = parameter.name, .unit = parameter.unit, .groups = groups};
@@ -122,12 +142,9 @@ ParameterEstimate summary_of_groups(const EffectParameter& parameter, std::vecto
                   })->high;
     return result;
   }
-  const auto quantile = [&](double p) {
-    return groups[static_cast<std::size_t>(std::clamp(p, 0.0, 1.0) * static_cast<double>(n - 1))].value;
-  };
-  const double half = 1.96 / (2 * std::sqrt(static_cast<double>(n)));  // order statistics of a median
-  result.low = quantile(0.5 - half);
-  result.high = quantile(0.5 + half);
+  const std::size_t outside = outside_median_interval(n);
+  result.low = groups[outside].value;
+  result.high = groups[n - 1 - outside].value;
   return result;
 }
 

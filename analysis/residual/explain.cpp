@@ -40,6 +40,31 @@ struct SetAside {
   }
 };
 
+std::string in_words(const IsolatedValue& value, const char* what) {
+  return fmt::format("{} of {} is {:.6g}, far from all others ({:.6g} to {:.6g}): {}", value.covariate,
+                     value.row, value.value, value.low, value.high, what);
+}
+
+std::vector<SuspectRow> rows_of(const std::vector<IsolatedValue>& values) {
+  std::vector<SuspectRow> rows;
+  for (const IsolatedValue& value : values)
+    if (std::none_of(rows.begin(), rows.end(), [&](const SuspectRow& row) { return row.row == value.row; }))
+      rows.push_back({value.row, 0});
+  return rows;
+}
+
+/// A campaign's runs are many, and its conditions are typed by hand: one that is a slip goes with its run.
+std::vector<std::string> without_mistyped(SetAside& aside) {
+  std::vector<std::string> said;
+  const std::vector<IsolatedValue> values = mistyped_values(aside.kept);
+  const std::vector<SuspectRow> rows = rows_of(values);
+  const bool few = rows.size() <= aside.room();
+  if (few) aside.take(rows);
+  for (const IsolatedValue& value : values)
+    said.push_back(in_words(value, few ? "set aside; a typing error?" : "a typing error?"));
+  return said;
+}
+
 /// A condition far from all others is said. Where the model found with such rows predicts worse than none, it
 /// is found without them.
 Explanation without_isolated(Explanation explanation, SetAside& aside,
@@ -47,10 +72,7 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
   const std::vector<IsolatedValue> isolated = isolated_values(aside.kept);
   if (isolated.empty()) return explanation;
   const bool misled = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
-  std::vector<SuspectRow> rows;
-  for (const IsolatedValue& value : isolated)
-    if (std::none_of(rows.begin(), rows.end(), [&](const SuspectRow& row) { return row.row == value.row; }))
-      rows.push_back({value.row, 0});
+  const std::vector<SuspectRow> rows = rows_of(isolated);
   const bool aside_too = misled && rows.size() <= aside.room();
   if (aside_too) {
     aside.take(rows);
@@ -58,10 +80,8 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
   }
   for (const IsolatedValue& value : isolated)
     explanation.warnings.push_back(
-        fmt::format("{} of {} is {:.6g}, far from all others ({:.6g} to {:.6g}): {}", value.covariate,
-                    value.row, value.value, value.low, value.high,
-                    aside_too ? "set aside, since the model found with it predicted worse than none"
-                              : "a typing error?"));
+        in_words(value, aside_too ? "set aside, since the model found with it predicted worse than none"
+                                  : "a typing error?"));
   return explanation;
 }
 
@@ -158,6 +178,8 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
     if (aside.room() == 0) break;
     aside.take({*row});
   }
+  const std::vector<std::string> mistyped =
+      observations.from_table ? std::vector<std::string>() : without_mistyped(aside);
   if (!observations.from_table)
     if (const auto wild = wild_runs(aside.kept); wild.size() <= aside.room()) aside.take(wild);
   Explanation explanation = explain_once(aside.kept, effects, settings);
@@ -171,6 +193,7 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
     explanation = without_isolated(std::move(explanation), aside, effects, settings);
   explanation = without_refuted(std::move(explanation), aside.kept, effects, settings);
   explanation = without_names_of_incomplete(std::move(explanation), aside.kept, effects, settings);
+  explanation.warnings.insert(explanation.warnings.begin(), mistyped.begin(), mistyped.end());
   explanation.suspect_rows.insert(explanation.suspect_rows.begin(), aside.rows.begin(), aside.rows.end());
   return explanation;
 }

@@ -22,13 +22,19 @@ void report_untestable(const Observations& observations, const std::vector<const
 /// Conditions that change once and for all where an adopted step may be: another battery, other blades.
 void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation);
 
-/// Effects of the measured speed that take back a part of its square: noise of the reading does that as well.
-void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
-                         Explanation& explanation);
-
 /// What the search found of the runs' scatter and allowed for: a rotor with more of it, neighbours that
 /// resemble each other.
 void warn_of_scatter(const Observations& observations, Explanation& explanation);
+
+// --- doubts.cpp
+
+/// What the opened seal and the intervals say against what was adopted.
+void warn_of_doubts(Explanation& explanation);
+
+/// Effects of the measured speed that take back a part of its square: noise of the reading does that as well,
+/// and where it would be no more than tachometers have, the two are not to be told apart.
+void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
+                         Explanation& explanation);
 
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
@@ -113,5 +119,10 @@ struct IsolatedValue {
   double value = 0, low = 0, high = 0;  // low, high: of all other rows
 };
 std::vector<IsolatedValue> isolated_values(const Observations& observations);
+
+/// Of a campaign: those whose runs are to be set aside at once. A value five ranges away would be the whole
+/// of what goes with its condition; one a range away, of a run that is far off its location on all rotors
+/// alike, is what made it so (the air's density).
+std::vector<IsolatedValue> mistyped_values(const Observations& observations);
 
 }  // namespace tunnelrig

@@ -74,7 +74,7 @@ Explanation without_names_of_incomplete(Explanation explanation, const Observati
 
   const auto is_found_there = [&](const Effect& effect) {
     return std::ranges::any_of(there.adopted, [&](const AdoptedEffect& adopted) {
-      return adopted.term.effect->cause() == effect.cause();
+      return adopted.term.effect->name == effect.name && adopted.term.effect->covariates == effect.covariates;
     });
   };
   std::vector<std::string> gone;

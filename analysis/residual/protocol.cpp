@@ -1,10 +1,12 @@
 // The protocol, once: seal, search on the open runs, open the seal, estimate on all.
 #include "analysis/residual/explanation_parts.h"
+#include "calibration/distributions.h"
 #include "datasets/error.h"
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <set>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -42,6 +44,19 @@ bool speak_against(const HeldOutErrors& with, const HeldOutErrors& without) {
   const MatrixXd squares = with.error.array().square() - without.error.array().square();
   const Eigen::VectorXd of_runs = squares.array().isNaN().select(0, squares).rowwise().sum();
   return of_runs.sum() > kClearly * of_runs.norm() && rms(with.error) > rms(with.expected_std);
+}
+
+/// Whether errors are larger than runs of that scatter make them, by their blocks: each counts as one.
+bool is_beyond_floor(const Observations& observations, const ErrorEstimate& after, double noise_floor,
+                     const std::vector<int>& scored) {
+  constexpr double kFarAboveFloor = 1.25, kCertain = 0.99;
+  if (!(noise_floor > 0)) return false;
+  std::set<int> ids;
+  for (const int row : scored) ids.insert(observations.block[static_cast<std::size_t>(row)]);
+  const double blocks = static_cast<double>(ids.size());
+  const double ratio = after.held_out_rmse / noise_floor;
+  return after.held_out_low > kFarAboveFloor * noise_floor ||
+         ratio * ratio > chi2_quantile(kCertain, blocks) / blocks;
 }
 
 HeldOutErrors score(const Observations& observations, const JointFit& fit, const NullFit& variances,
@@ -122,44 +137,6 @@ void report_adopted(const Observations& observations, const Attribution& found, 
           separating_run(observations, accepted.term, accepted.confounded[0].term, found.final, rows);
     explanation.adopted.push_back(std::move(adopted));
   }
-}
-
-/// What the opened seal and the intervals say against what was adopted.
-void warn_of_doubts(Explanation& explanation) {
-  constexpr double kFarAboveFloor = 1.25;
-  for (const AdoptedEffect& adopted : explanation.adopted) {
-    for (const ParameterEstimate& parameter : adopted.parameters)
-      if (parameter.theory && (parameter.value < parameter.low || parameter.value > parameter.high))
-        explanation.warnings.push_back(fmt::format(
-            "{}: its {} is theory's {:.4g}, and the data alone say {:.4g} to {:.4g}: something else goes "
-            "with it",
-            adopted.term.label(), parameter.name, parameter.value, parameter.low, parameter.high));
-    if (const ParameterEstimate& amplitude = adopted.parameters[0];
-        amplitude.theory && amplitude.low <= 0 && amplitude.high >= 0)
-      explanation.warnings.push_back(
-          fmt::format("{}: the data alone do not tell its {} from 0", adopted.term.label(), amplitude.name));
-  }
-  const bool worse = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
-  if (const SealedErrors& sealed = explanation.sealed;
-      worse && sealed.all < std::min(sealed.curves, explanation.before.held_out_rmse))
-    explanation.warnings.push_back(
-        fmt::format("on the sealed blocks the error is larger with the names alone than without; beside the "
-                    "curves they make it smaller ({:.4g}, without them {:.4g}): adopt them together "
-                    "(--adopt-empirical)",
-                    sealed.all, sealed.curves));
-  else if (worse && explanation.sealed.against_adopted)
-    explanation.warnings.emplace_back(
-        "on the sealed blocks the error is larger with what was adopted than without: doubt it");
-  else if (worse)
-    explanation.warnings.emplace_back(
-        "on the sealed blocks what was adopted does little: that the error is larger with it than without is "
-        "chance, and says neither that it is right nor that it is wrong");
-  else if (explanation.after.held_out_low > kFarAboveFloor * explanation.noise_floor &&
-           explanation.noise_floor > 0)
-    explanation.warnings.push_back(
-        fmt::format("on the sealed blocks the error after is {:.2g} times the noise floor: something varies "
-                    "there that the model does not have",
-                    explanation.after.held_out_rmse / explanation.noise_floor));
 }
 
 /// Change-points as the runs are numbered, where the search counted rows.
@@ -268,6 +245,8 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
                         .against_names = speak_against(whole, curves),
                         .against_adopted = speak_against(after, before)};
   explanation.noise_floor = rms(whole.expected_std);
+  explanation.sealed.beyond_floor =
+      is_beyond_floor(alone, explanation.after, explanation.noise_floor, scored);
   explanation.before.rmse = rms(residuals(alone, found.baseline, seal.open));
   explanation.after.rmse = rms(residuals(wide, shown, seal.open));
 }

@@ -45,6 +45,7 @@ Spread simulated(const MixedModel& model, const NullFit& fit, std::size_t stratu
 
 std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fit, const Components& residual,
                                       std::mt19937_64& random) {
+  constexpr double kRounding = 1e-9;
   std::array<double, 2> result = {0, 0};
   const bool neighbours = std::any_of(model.blocks().begin(), model.blocks().end(),
                                       [](const auto& runs) { return runs.size() > 1; });
@@ -57,6 +58,8 @@ std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fi
     const Spread none = simulated(model, fit, s, 0, random);
     if (seen < none.mean + 2 * none.deviation) continue;
     const Spread known = simulated(model, fit, s, kKnown, random);
+    // Of blocks that are groups of two runs it is −1/2 whatever the correlation.
+    if (!(none.deviation > kRounding) || known.mean - none.mean < 2 * none.deviation) continue;
     result[model.strata()[s].side()] =
         std::clamp(kKnown * (seen - none.mean) / (known.mean - none.mean), 0.0, kMostCorrelated);
   }

@@ -1,6 +1,7 @@
 #include "analysis/residual/seal.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <numeric>
 #include <random>
 #include <set>
@@ -27,8 +28,9 @@ std::set<int> choose(const Observations& observations, std::uint64_t seed) {
   const int wanted = std::max(1, (blocks + 2) / 4);
   std::set<int> sealed;
   for (int s = 0; s < wanted; ++s) {
-    std::vector<int> neighbours(static_cast<std::size_t>((s + 1) * blocks / wanted - s * blocks / wanted));
-    std::iota(neighbours.begin(), neighbours.end(), s * blocks / wanted);
+    const auto first_of = [&](std::int64_t part) { return static_cast<int>(part * blocks / wanted); };
+    std::vector<int> neighbours(static_cast<std::size_t>(first_of(s + 1) - first_of(s)));
+    std::iota(neighbours.begin(), neighbours.end(), first_of(s));
     std::shuffle(neighbours.begin(), neighbours.end(), random);
     // Groups that lie within blocks would all be orphans: then any block is as good as another.
     const auto lost = [&](int block) {

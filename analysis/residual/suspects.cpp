@@ -187,26 +187,67 @@ std::vector<SuspectRow> gross_rows(const Observations& observations,
   return result;
 }
 
-std::vector<IsolatedValue> isolated_values(const Observations& observations) {
-  constexpr double kRangesAway = 5;
+namespace {
+
+constexpr double kRangesAway = 5;
+
+/// Values further from all others than so many times their range.
+std::vector<IsolatedValue> values_beyond(const Observations& observations, double ranges) {
   constexpr Index kFewestRows = 8;
   std::vector<IsolatedValue> result;
   for (const Covariate& covariate : observations.covariates) {
     if (covariate.derived || covariate.per_channel() || !covariate.labels.empty() ||
-        covariate.value.rows() < kFewestRows || observations.not_usable.contains(covariate.name))
+        observations.not_usable.contains(covariate.name))
       continue;
-    std::vector<Index> order(static_cast<std::size_t>(covariate.value.rows()));
-    std::iota(order.begin(), order.end(), Index{0});
     const auto at = [&](Index r) { return covariate.value(r, 0); };
+    std::vector<Index> order;  // far from ground and ceiling there is no distance
+    for (Index r = 0; r < covariate.value.rows(); ++r)
+      if (std::isfinite(at(r))) order.push_back(r);
+    if (static_cast<Index>(order.size()) < kFewestRows) continue;
     std::sort(order.begin(), order.end(), [&](Index a, Index b) { return at(a) < at(b); });
     const double low = at(order[1]), high = at(order[order.size() - 2]);
     const auto consider = [&](Index row, double from, double to, double gap) {
-      if (to > from && gap > kRangesAway * (to - from))
+      if (to > from && gap > ranges * (to - from))
         result.push_back(
             {observations.name[static_cast<std::size_t>(row)], covariate.name, at(row), from, to});
     };
     consider(order.front(), low, at(order.back()), low - at(order.front()));
     consider(order.back(), at(order.front()), high, at(order.back()) - high);
+  }
+  return result;
+}
+
+/// Of each run, what all rotors have in common beside its location's median, in σ by the median of all.
+VectorXd common_distance(const Observations& observations) {
+  std::map<int, std::vector<Index>> runs_of_group;
+  for (Index r = 0; r < observations.rows(); ++r)
+    runs_of_group[observations.group[static_cast<std::size_t>(r)]].push_back(r);
+  const VectorXd common = observations.y.rowwise().mean();
+  VectorXd away = common;
+  for (const auto& [group, runs] : runs_of_group) {
+    const VectorXd own = common(runs);
+    away(runs).array() -= upper_median({own.begin(), own.end()});
+  }
+  const double sigma = sigma_by_median(away.cwiseAbs());
+  return sigma > 0 ? VectorXd(away / sigma) : VectorXd(VectorXd::Zero(away.size()));
+}
+
+}  // namespace
+
+std::vector<IsolatedValue> isolated_values(const Observations& observations) {
+  return values_beyond(observations, kRangesAway);
+}
+
+std::vector<IsolatedValue> mistyped_values(const Observations& observations) {
+  constexpr double kARangeAway = 1, kFarOff = 10;
+  std::vector<IsolatedValue> result = isolated_values(observations);
+  const VectorXd away = common_distance(observations);
+  for (const IsolatedValue& value : values_beyond(observations, kARangeAway)) {
+    const auto run = std::find(observations.name.begin(), observations.name.end(), value.row);
+    const bool known = std::any_of(result.begin(), result.end(), [&](const IsolatedValue& other) {
+      return other.row == value.row && other.covariate == value.covariate;
+    });
+    if (!known && std::abs(away(run - observations.name.begin())) > kFarOff) result.push_back(value);
   }
   return result;
 }

@@ -7,12 +7,12 @@
 namespace tunnelrig {
 
 /// This process among those that mpirun started. Where it did not, or where the suite was built without
-/// OpenMPI
-/// (-DTUNNELRIG_MPI=ON), there is this one alone. One object, in the main thread.
+/// OpenMPI (-DTUNNELRIG_MPI=ON), there is this one alone. One object, in the main thread.
 class Processes {
  public:
   Processes();
-  ~Processes();  // waits for the others, unless an exception ends this process: mpirun then ends them all
+  /// Waits for the others, unless an exception ends this process: mpirun then ends them all.
+  ~Processes();  // NOLINT(performance-trivially-destructible): it is where there is OpenMPI
   Processes(const Processes&) = delete;
   Processes& operator=(const Processes&) = delete;
 

@@ -1,5 +1,6 @@
 #include "datasets/import_doubts.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -26,9 +26,9 @@ TEST(Decimator, ResponseIsTheDocumentedOne) {
   double sum = 0;
   for (int i = 0; i < DECIMATOR_TAPS; ++i) sum += tap(i);
   EXPECT_EQ(sum, 1.0);
-  for (double f = 0; f <= 460; f += 1) EXPECT_NEAR(response_dB(f), 0, 0.01) << f;
+  for (int f = 0; f <= 460; ++f) EXPECT_NEAR(response_dB(f), 0, 0.01) << f;
   EXPECT_NEAR(response_dB(2000.0 / 3.0), -6, 0.1);
-  for (double f = 867; f <= kConversion_hz / 2; f += 1) EXPECT_LT(response_dB(f), -57) << f;
+  for (int f = 867; f <= kConversion_hz / 2; ++f) EXPECT_LT(response_dB(f), -57) << f;
 }
 
 /// Amplitude at the output of a sine of 1000 counts at the input.

@@ -8,7 +8,7 @@ extern "C" {
 #endif
 
 /* core/ring.c once more, with every access to what both sides share announced by a call first. */
-extern void (*interleaved_step)(void);
+extern void (*interleaved_step)(void); /* NOLINT(modernize-redundant-void-arg): C reads this as well */
 void interleaved_init(frame_ring* ring, ring_slot* slots, uint32_t capacity);
 bool interleaved_push(frame_ring* ring, const ring_slot* slot);
 uint32_t interleaved_count(const frame_ring* ring);

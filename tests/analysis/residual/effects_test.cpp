@@ -177,7 +177,8 @@ TEST(Effects, ImagesInGroundAndCeilingHaveNoPole) {
     if (effect.form != "image") continue;
     SCOPED_TRACE(title(effect));
     const double strongest = effect.parameters[0].upper;
-    for (double distance_R = 0.1; distance_R < 6; distance_R += 0.05) {
+    for (int i = 2; i < 120; ++i) {
+      const double distance_R = 0.05 * i;
       const std::vector<double> x = {distance_R};
       const double force_N = effect.force_N({.x = x, .reference = x}, &strongest, 1.0);
       EXPECT_GT(force_N, 1) << distance_R;

@@ -1,0 +1,123 @@
+// What speaks against an explanation that was found: the opened seal, the intervals, readings that scatter,
+// rows that are alike.
+#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/run_correlation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// What the opened seal and the intervals say against what was adopted.
+void warn_of_doubts(Explanation& explanation) {
+  for (const AdoptedEffect& adopted : explanation.adopted) {
+    for (const ParameterEstimate& parameter : adopted.parameters)
+      if (parameter.theory && (parameter.value < parameter.low || parameter.value > parameter.high))
+        explanation.warnings.push_back(fmt::format(
+            "{}: its {} is theory's {:.4g}, and the data alone say {:.4g} to {:.4g}: something else goes "
+            "with it",
+            adopted.term.label(), parameter.name, parameter.value, parameter.low, parameter.high));
+    if (const ParameterEstimate& amplitude = adopted.parameters[0];
+        amplitude.theory && amplitude.low <= 0 && amplitude.high >= 0)
+      explanation.warnings.push_back(
+          fmt::format("{}: the data alone do not tell its {} from 0", adopted.term.label(), amplitude.name));
+  }
+  const bool worse = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
+  if (const SealedErrors& sealed = explanation.sealed;
+      worse && sealed.all < std::min(sealed.curves, explanation.before.held_out_rmse))
+    explanation.warnings.push_back(
+        fmt::format("on the sealed blocks the error is larger with the names alone than without; beside the "
+                    "curves they make it smaller ({:.4g}, without them {:.4g}): adopt them together "
+                    "(--adopt-empirical)",
+                    sealed.all, sealed.curves));
+  else if (explanation.sealed.beyond_floor)
+    explanation.warnings.push_back(
+        fmt::format("on the sealed blocks the error after is {:.2g} times the noise floor: something varies "
+                    "there that the model does not have",
+                    explanation.after.held_out_rmse / explanation.noise_floor));
+  else if (worse && explanation.sealed.against_adopted)
+    explanation.warnings.emplace_back(
+        "on the sealed blocks the error is larger with what was adopted than without: doubt it");
+  else if (worse)
+    explanation.warnings.emplace_back(
+        "on the sealed blocks what was adopted does little: that the error is larger with it than without is "
+        "chance, and says neither that it is right nor that it is wrong");
+}
+
+void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
+                         Explanation& explanation) {
+  constexpr double kInstrument = 0.01, kCommon = 0.003;  // of the speed: none scatters more; many do
+  const Covariate* speed = observations.find("speed_rpm");
+  if (speed == nullptr || observations.from_table || speed->value.array().isNaN().any()) return;
+  const Eigen::ArrayXd log_speed = speed->value.col(0).array().log() - speed->value.array().log().mean();
+  for (AdoptedEffect& adopted : explanation.adopted) {
+    const auto& names = adopted.term.effect->covariates;
+    if (adopted.term.effect->name == "rotor_speed" ||
+        std::find(names.begin(), names.end(), "speed_rpm") == names.end())
+      continue;
+    const Index channel = std::max(adopted.term.rotor, 0);
+    const Eigen::ArrayXd change =
+        respond(adopted.term, observations, predicted).value[0].col(channel).array();
+    const double exponent = ((change - change.mean()) * log_speed).sum() / log_speed.square().sum();
+    const double share = -exponent / 2;  // of the readings' variance, which is scatter then
+    const double scatter_rpm =
+        std::sqrt(std::max(0.0, share) * (speed->value.array() - speed->value.mean()).square().mean());
+    if (share <= 0 || scatter_rpm > kInstrument * speed->value.mean()) continue;
+    explanation.warnings.push_back(fmt::format(
+        "{}: readings of speed_rpm that scatter by {:.2g} rev/min would look the same, since they make "
+        "the thrust depend less on what is read; speeds further apart would tell",
+        adopted.term.label(), scatter_rpm));
+    if (scatter_rpm < kCommon * speed->value.mean())
+      adopted.confounded_with.emplace_back("scatter of speed_rpm");
+  }
+}
+
+namespace {
+
+/// Whether most rows have the value of the row before them.
+bool is_shared_by_neighbours(const Covariate& covariate) {
+  Index shared = 0;
+  for (Index r = 1; r < covariate.value.rows(); ++r)
+    if (covariate.value(r, 0) == covariate.value(r - 1, 0)) ++shared;
+  return 2 * shared > covariate.value.rows() && shared + 1 < covariate.value.rows();
+}
+
+/// Days whose rows have one weather: what goes with the weather has as many independent values as there are
+/// days.
+void warn_of_shared_conditions(const Observations& observations, Explanation& explanation) {
+  std::set<std::string> names;
+  for (const AdoptedEffect& adopted : explanation.adopted)
+    names.insert(adopted.term.effect->covariates.begin(), adopted.term.effect->covariates.end());
+  for (const UnknownStructure& unknown : explanation.unknown) names.insert(unknown.condition);
+  for (const std::string& name : names)
+    if (const Covariate* covariate = observations.find(name);
+        covariate != nullptr && is_shared_by_neighbours(*covariate))
+      explanation.warnings.push_back(fmt::format(
+          "neighbouring rows share their {}, and are taken as independent: if they belong together (a day, a "
+          "set-up), give them a block (blocks = a column), or names and p may be wrong",
+          name));
+}
+
+}  // namespace
+
+void warn_of_alike_rows(const Observations& observations, Explanation& explanation) {
+  if (!observations.blocks_are_rows) return;
+  warn_of_shared_conditions(observations, explanation);
+  VectorXd residual = explanation.residual_after.col(0);
+  if (observations.multiplicative) residual = residual.array() / observations.value.col(0).array();
+  const double correlation = row_correlation(observations, observations.all_rows(), residual);
+  if (correlation == 0) return;
+  explanation.warnings.push_back(fmt::format(
+      "rows resemble the row before them (correlation {:.2f}) and are taken as independent: names and "
+      "p may be wrong; rows that belong together want a block of their own (blocks = a column, or "
+      "bins(column, n))",
+      correlation));
+}
+
+}  // namespace tunnelrig

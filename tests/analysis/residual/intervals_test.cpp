@@ -1,0 +1,73 @@
+// Intervals hold what they say they hold, over many simulated samples.
+#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/simulated.h"
+#include "support/seeds.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+struct Intervals : testing::Test {
+  std::mt19937_64 random{test::seed()};
+  double normal(double sigma) { return std::normal_distribution<double>(0, sigma)(random); }
+
+  /// How often the interval of a held-out error holds its true value √(1 + session²), of blocks of six runs.
+  double coverage_of_error(int blocks, double session) {
+    constexpr int kSamples = 600, kRuns = 6;
+    const Observations o = test::simulate(
+        {.runs_of_block = std::vector<int>(static_cast<std::size_t>(blocks), kRuns), .groups = 1}, random);
+    int held = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      HeldOutErrors errors{.rows = o.all_rows(),
+                           .error = Eigen::MatrixXd(o.rows(), 1),
+                           .expected_std = {},
+                           .whitened = {},
+                           .amplitude = {}};
+      for (Eigen::Index run = 0; run < o.rows(); ++run)
+        errors.error(run, 0) = run % kRuns == 0 ? normal(session) : errors.error(run - 1, 0);
+      for (Eigen::Index run = 0; run < o.rows(); ++run) errors.error(run, 0) += normal(1);
+      ErrorEstimate estimate;
+      set_interval(o, errors, static_cast<std::uint64_t>(i), estimate);
+      const double truth = std::hypot(1, session);
+      held += estimate.held_out_low <= truth && truth <= estimate.held_out_high ? 1 : 0;
+    }
+    return static_cast<double>(held) / kSamples;
+  }
+
+  double coverage_of_median(int groups) {
+    constexpr int kSamples = 2000;
+    int held = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      std::vector<GroupEstimate> estimates;
+      for (int g = 0; g < groups; ++g) {
+        const double value = normal(1);
+        estimates.push_back({"", value, value - 0.1, value + 0.1});
+      }
+      const ParameterEstimate summary = summary_of_groups({}, estimates);
+      held += summary.low <= 0 && 0 <= summary.high ? 1 : 0;
+    }
+    return static_cast<double>(held) / kSamples;
+  }
+};
+
+TEST_F(Intervals, OfAHeldOutErrorHoldIt) {
+  for (const int blocks : {1, 2, 4, 12}) EXPECT_GT(coverage_of_error(blocks, 0), 0.93) << blocks << " blocks";
+  EXPECT_LT(coverage_of_error(40, 0), 0.99) << "wider than needed";
+  for (const int blocks : {4, 12})
+    EXPECT_GT(coverage_of_error(blocks, 1), 0.88) << blocks << " blocks that differ";
+}
+
+TEST_F(Intervals, OfTheMedianOfGroupsHoldIt) {
+  for (const int groups : {6, 7, 9, 12, 24, 60}) {
+    const double coverage = coverage_of_median(groups);
+    EXPECT_GT(coverage, 0.935) << groups;
+    EXPECT_LT(coverage, 0.995) << groups;
+  }
+}
+
+}  // namespace
+}  // namespace tunnelrig
