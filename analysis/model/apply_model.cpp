@@ -1,6 +1,7 @@
 #include "analysis/model/apply_model.h"
 
 #include "analysis/residual/joint_fit.h"
+#include "analysis/residual/previous_run.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -130,7 +131,9 @@ class Forward {
                             .at_theory = term.at_theory,
                             .parameters = term.parameters});
     }
-    if (needed) predicted_ = predict_response(observations_, mean, observations_.all_rows());
+    if (!needed) return;
+    predicted_ = predict_response(observations_, mean, observations_.all_rows());
+    previous_.emplace(observations_, predicted_);
   }
 
   bool applies(std::size_t t, Index row, Index channel) const {
@@ -146,12 +149,10 @@ class Forward {
     const ModelTerm& term = model_.terms[t];
     std::vector<double> x;
     for (const Covariate* covariate : term_covariates_[t]) x.push_back(covariate->at(row, channel));
-    const int before = observations_.previous[static_cast<std::size_t>(row)];
     Sample sample{.x = x,
                   .reference = term.reference,
-                  .previous_N = !term.effect->needs_previous || before < 0
-                                    ? std::numeric_limits<double>::quiet_NaN()
-                                    : predicted_(before, channel),
+                  .previous_N = term.effect->needs_previous ? previous_->force_N(row, channel) : kNaN,
+                  .previous_error_N = term.effect->needs_previous ? previous_->error_N(row, channel) : 0,
                   .other_N = term.other < 0 ? 0 : forces_N(term.other),
                   .newtons_per_volt = observations_.newtons_per_volt(channel),
                   .rig = &observations_.rig};
@@ -206,6 +207,7 @@ class Forward {
   std::vector<const Place*> curve_places_;     // null: alike everywhere
   std::vector<const Covariate*> curve_times_;  // null: with no other condition
   MatrixXd predicted_;
+  std::optional<PreviousRun> previous_;  // by them
 };
 
 /// Change-points are runs' names; the effects count runs.

@@ -244,10 +244,12 @@ MatrixXd on_baseline(const Observations& observations, const MatrixXd& residual,
 Forces predict_forces(const Observations& observations, const MeanModel& model,
                       const std::vector<int>& rows) {
   constexpr int kMostTurns = 10;
-  constexpr double kSettled = 1e-6;
+  constexpr double kSettled = 1e-6, kNearly = 1e-2;
   const MatrixXd none = MatrixXd::Zero(observations.rows(), observations.channels());
   Forces forces{on_baseline(observations, observations.y, none, rows), {}};
   forces.acted_on.assign(model.terms.size(), forces.predicted);
+  const Forces undisturbed = forces;
+  double change = 0;
   for (int turn = 0; turn < kMostTurns && !model.terms.empty(); ++turn) {
     MatrixXd residual = observations.y, added = none;
     std::vector<MatrixXd> own(model.terms.size(), none);
@@ -262,11 +264,12 @@ Forces predict_forces(const Observations& observations, const MeanModel& model,
     for (std::size_t t = 0; t < own.size(); ++t)
       forces.acted_on[t] = observations.multiplicative ? MatrixXd(predicted.array() / own[t].array().exp())
                                                        : MatrixXd(predicted - own[t]);
-    const double change = (predicted - forces.predicted).cwiseAbs().maxCoeff();
+    change = (predicted - forces.predicted).cwiseAbs().maxCoeff();
     forces.predicted = std::move(predicted);
     if (change <= kSettled * forces.predicted.cwiseAbs().maxCoeff()) break;
   }
-  return forces;
+  // Effects as large as the force itself chase it for ever, and it grows.
+  return change <= kNearly * undisturbed.predicted.cwiseAbs().maxCoeff() ? forces : undisturbed;
 }
 
 MatrixXd predict_response(const Observations& observations, const MeanModel& model,

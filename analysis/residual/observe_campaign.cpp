@@ -37,9 +37,9 @@ struct Source {
   }
 };
 
-/// cos(π j (w + ½)/W) coefficients of a run's windows, over the run's mean force.
-void set_course(const RunStatistics& statistics, Index row, Index channel, double newtons_per_volt,
-                double mean_N, std::vector<MatrixXd>& shape) {
+/// cos(π j (w + ½)/W) coefficients of a run's windows, in y's scale: volts times `scale`.
+void set_course(const RunStatistics& statistics, Index row, Index channel, double scale,
+                std::vector<MatrixXd>& shape) {
   const std::size_t channels = statistics.channels.size();
   const std::size_t windows = statistics.window_means_V.size() / channels;
   double sum = 0;
@@ -60,7 +60,7 @@ void set_course(const RunStatistics& statistics, Index row, Index channel, doubl
                      std::cos(std::numbers::pi * static_cast<double>(j) * (static_cast<double>(w) + 0.5) /
                               static_cast<double>(windows));
     }
-    shape[j - 1](row, channel) = 2 * coefficient / static_cast<double>(windows) * newtons_per_volt / mean_N;
+    shape[j - 1](row, channel) = 2 * coefficient / static_cast<double>(windows) * scale;
   }
 }
 
@@ -75,8 +75,9 @@ void add_courses(const Source& source, Observations& result) {
   result.shape.assign(kShapes, MatrixXd::Zero(source.rows(), result.channels()));
   for (Index row = 0; row < source.rows(); ++row) {
     for (Index c = 0; c < result.channels(); ++c) {
-      const double thrust_N = source.coefficients(row).thrust_N[static_cast<std::size_t>(c)];
-      set_course(*source.statistics(row), row, c, result.newtons_per_volt(c), thrust_N, result.shape);
+      const double per_volt = result.response == "thrust" ? result.newtons_per_volt(c) : 1;
+      const double scale = result.multiplicative ? per_volt / result.value(row, c) : per_volt;
+      set_course(*source.statistics(row), row, c, scale, result.shape);
     }
   }
 }

@@ -1,12 +1,14 @@
 #include "analysis/residual/terms.h"
 
 #include "analysis/residual/joint_fit.h"
+#include "analysis/residual/previous_run.h"
 #include "analysis/residual/upper_median.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
@@ -33,20 +35,11 @@ const MatrixXd& cosines() {
   return table;
 }
 
-/// In the scale of y.
-MatrixXd scaled(const Observations& observations, const MatrixXd& predicted) {
-  return observations.multiplicative ? MatrixXd((predicted.array() / observations.known.array()).log())
-                                     : predicted;
-}
-
-/// n × c, in y's scale: of the error of the constant of each run's group, by what is left beside `predicted`.
-MatrixXd variance_of_constants(const Observations& observations, const MatrixXd& predicted) {
-  const double free = static_cast<double>(observations.rows() - observations.groups());
-  const Eigen::RowVectorXd variance =
-      (observations.y - scaled(observations, predicted)).colwise().squaredNorm() / std::max(free, 1.0);
-  VectorXd count = VectorXd::Zero(observations.groups());
-  for (const int group : observations.group) count(group) += 1;
-  return count(observations.group).cwiseInverse() * variance;
+/// log u. Below a share that no force is left of it goes on straight: a model that takes more than the force
+/// itself is far off, but by a number.
+EffectJet log_of_share(const EffectJet& u) {
+  constexpr double kLeast = 0.02;
+  return u.a >= kLeast ? log(u) : u / kLeast + (std::log(kLeast) - 1);
 }
 
 class Evaluation {
@@ -67,7 +60,7 @@ class Evaluation {
         parameters_[k].v[static_cast<Index>(k)] = 1;
     }
     within_ = term.effect->within_time() && !observations.shape.empty();
-    if (term.effect->needs_previous) constant_variance_ = variance_of_constants(observations, predicted);
+    if (term.effect->needs_previous) previous_.emplace(observations, predicted);
   }
 
   bool applies(Index row, Index channel) const {
@@ -102,14 +95,15 @@ class Evaluation {
   Sample sample_of(Index row, Index channel) {
     for (std::size_t k = 0; k < covariates_.size(); ++k)
       x_[k] = is_order_[k] ? position(row) : covariates_[k]->at(row, channel);
-    return {.x = x_,
-            .reference = reference_,
-            .previous_N = previous_force(row, channel),
-            .previous_error_N = previous_error(row, channel),
-            .other_N = term_.other < 0 ? 0 : force_of(row, term_.other),
-            .newtons_per_volt =
-                channel < observations_.newtons_per_volt.size() ? observations_.newtons_per_volt(channel) : 1,
-            .rig = &observations_.rig};
+    return {
+        .x = x_,
+        .reference = reference_,
+        .previous_N = previous_ ? previous_->force_N(row, channel) : std::numeric_limits<double>::quiet_NaN(),
+        .previous_error_N = previous_ ? previous_->error_N(row, channel) : 0,
+        .other_N = term_.other < 0 ? 0 : force_of(row, term_.other),
+        .newtons_per_volt =
+            channel < observations_.newtons_per_volt.size() ? observations_.newtons_per_volt(channel) : 1,
+        .rig = &observations_.rig};
   }
 
   /// Change-points are places among the rows, whatever numbers the runs have and whichever are left out.
@@ -117,34 +111,10 @@ class Evaluation {
     return observations_.position.size() > 0 ? observations_.position(row) : static_cast<double>(row);
   }
 
-  bool at_the_same_place(Index row, int other) const {
-    return observations_.group[static_cast<std::size_t>(row)] ==
-           observations_.group[static_cast<std::size_t>(other)];
-  }
-
-  /// Of the run before; this run's own where that was nearly the same at the same place: which of the two was
-  /// larger depends on what the model does not have.
-  double previous_force(Index row, Index channel) const {
-    constexpr double kSame = 0.01;
-    const int before = observations_.previous[static_cast<std::size_t>(row)];
-    if (before < 0) return std::numeric_limits<double>::quiet_NaN();
-    const double own = force_of(row, channel), previous = force_of(before, channel);
-    const bool same = at_the_same_place(row, before) && std::abs(previous - own) < kSame * std::abs(own);
-    return same ? own : previous;
-  }
-
-  /// Of the difference between the forces of this run and the one before it.
-  double previous_error(Index row, Index channel) const {
-    const int before = observations_.previous[static_cast<std::size_t>(row)];
-    if (constant_variance_.size() == 0 || before < 0 || at_the_same_place(row, before)) return 0;
-    const double error = std::sqrt(constant_variance_(row, channel) + constant_variance_(before, channel));
-    return observations_.multiplicative ? error * std::abs(force_of(row, channel)) : error;
-  }
-
   /// log(F'/F) where the model is multiplicative, F' − F where it is not.
   EffectJet change(const Sample& sample, double force) const {
     const EffectJet changed = term_.effect->jet_N(sample, parameters_, EffectJet(force));
-    return observations_.multiplicative ? log(changed / force) : changed - force;
+    return observations_.multiplicative ? log_of_share(changed / force) : changed - force;
   }
 
   static void put(Index row, Index channel, std::size_t component, const EffectJet& change, double weight,
@@ -163,7 +133,7 @@ class Evaluation {
   std::vector<bool> is_order_;  // of the rows
   std::vector<double> x_;
   EffectJet parameters_[kMaxEffectParameters];
-  MatrixXd constant_variance_;  // n × c; of effects of the run before
+  std::optional<PreviousRun> previous_;
   bool within_ = false;
 };
 

@@ -164,6 +164,19 @@ TEST_F(JointFitTest, ALineAndWhatBendsItAreFoundTogether) {
   EXPECT_LT(estimates[0][0].standard_error, 0.01);
 }
 
+/// Each turn would make the force, and with it the effect, larger.
+TEST_F(JointFitTest, AnEffectLargerThanTheForceDoesNotChaseIt) {
+  Observations o =
+      test::simulate({.runs_of_block = std::vector<int>(14, 8), .multiplicative = false}, random);
+  test::add_covariate(o, "tunnel_airspeed_m_s", 0, 30, random);
+  const auto rows = o.all_rows();
+  const MatrixXd without = predict_response(o, {}, rows);
+  for (const double per_speed2 : {-0.02, 0.02}) {
+    const MatrixXd with = predict_response(o, {{term("axial_wind", {per_speed2})}, {}}, rows);
+    EXPECT_LT(with.cwiseAbs().maxCoeff(), 20 * without.cwiseAbs().maxCoeff()) << per_speed2;
+  }
+}
+
 TEST_F(JointFitTest, RefitFollowsTheRuns) {
   Observations o = observations(1, 0, 2e-4);
   test::add_effect(o, "creep", {0.04, 90});

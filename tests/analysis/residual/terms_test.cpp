@@ -93,6 +93,20 @@ TEST(Terms, DerivativesAreFiniteDifferencesOfTheValue) {
   }
 }
 
+TEST(Terms, WhatTakesMoreThanTheForceIsFarOffByANumber) {
+  std::mt19937_64 random(test::seed());
+  Observations o = test::simulate({}, random);
+  test::add_covariate(o, "hours_in_session", 0, 10, random);
+  const auto change = [&](double drift_N_h) {
+    const Term term{.effect = &test::effect_named("zero_drift_time"), .parameters = {drift_N_h}};
+    return respond(term, o, MatrixXd(o.value));
+  };
+  const TermResponse there = change(-2), further = change(-2 - 1e-6);  // 20 N of 7 N
+  ASSERT_TRUE(there.value[0].allFinite());
+  EXPECT_LT(there.value[0].minCoeff(), std::log(0.02)) << "no force is left";
+  EXPECT_LT((further.value[0] - there.value[0] + 1e-6 * there.derivative[0][0]).cwiseAbs().maxCoeff(), 1e-9);
+}
+
 TEST(Terms, ActOnTheirRotorOnly) {
   std::mt19937_64 random(test::seed() + 2);
   Observations o = test::simulate({.channels = 4}, random);
