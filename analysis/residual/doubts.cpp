@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace tunnelrig {
 
@@ -80,6 +82,25 @@ void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd
 
 namespace {
 
+/// The constant of thrusts beside their C_T, by rows that scatter as they were found to, and its standard
+/// error.
+struct Tare {
+  double value_N = 0, standard_error_N = 0;
+};
+Tare tare_of(const Observations& observations, const VectorXd& thrust_N, const std::vector<int>& rows) {
+  const VectorXd weight = observations.scatter.of_runs(rows).cwiseInverse();
+  Eigen::MatrixXd columns(thrust_N(rows).size(), 2);
+  columns << Eigen::MatrixXd::Ones(columns.rows(), 1), observations.slopes(rows, 0);
+  columns = weight.asDiagonal() * columns;
+  const VectorXd y = weight.asDiagonal() * VectorXd(thrust_N(rows));
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
+  if (qr.rank() < 2) return {};
+  const Eigen::Vector2d fitted = qr.solve(y);
+  const double variance = (y - columns * fitted).squaredNorm() / static_cast<double>(y.size() - 2);
+  const Eigen::Matrix2d inverse = (columns.transpose() * columns).inverse();
+  return {fitted(0), std::sqrt(variance * inverse(0, 0))};
+}
+
 /// Whether most rows have the value of the row before them.
 bool is_shared_by_neighbours(const Covariate& covariate) {
   Index shared = 0;
@@ -105,6 +126,34 @@ void warn_of_shared_conditions(const Observations& observations, Explanation& ex
 }
 
 }  // namespace
+
+void warn_of_tares(const Observations& observations, const MeanModel& model, Explanation& explanation) {
+  constexpr double kClear = 4;
+  constexpr std::size_t kFewest = 5, kNamed = 4;
+  const bool constant_beside_c_t =
+      observations.coefficient && !observations.multiplicative && observations.slopes.cols() == 1;
+  if (!constant_beside_c_t || observations.baseline != "constant") return;
+  const std::vector<int> all = observations.all_rows();
+  const Forces forces = predict_forces(observations, model, all);
+  const VectorXd thrust_N = (observations.y - linearise(observations, model, forces).offset[0]).col(0);
+  std::map<int, std::vector<int>> rows_of;
+  for (const int row : all) rows_of[observations.group[static_cast<std::size_t>(row)]].push_back(row);
+  std::vector<std::string> tares;
+  for (const auto& [group, rows] : rows_of) {
+    if (rows.size() < kFewest) continue;
+    const Tare tare = tare_of(observations, thrust_N, rows);
+    if (std::abs(tare.value_N) <= kClear * tare.standard_error_N) continue;
+    const std::string& name = observations.group_name[static_cast<std::size_t>(group)];
+    tares.push_back(fmt::format("{}{:.3g} ± {:.2g} {}", observations.groups() > 1 ? name + " " : "",
+                                tare.value_N, tare.standard_error_N, observations.unit));
+  }
+  if (tares.empty()) return;
+  const auto end = tares.begin() + static_cast<std::ptrdiff_t>(std::min(tares.size(), kNamed));
+  explanation.warnings.push_back(
+      fmt::format("the baseline has a constant beside C_T, {}{}: a tare that was not taken off?",
+                  fmt::join(tares.begin(), end, ", "),
+                  tares.size() > kNamed ? fmt::format(" and {} more", tares.size() - kNamed) : ""));
+}
 
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation) {
   if (!observations.blocks_are_rows) return;

@@ -36,6 +36,9 @@ void warn_of_doubts(Explanation& explanation);
 void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
                          Explanation& explanation);
 
+/// Constants of a table's thrusts beside their C_T, where the baseline has them.
+void warn_of_tares(const Observations& observations, const MeanModel& model, Explanation& explanation);
+
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
 

@@ -69,7 +69,7 @@ void set_response(const TableSource& source, const ObservationChoice& choice, Ob
   result.coefficient = own && column.meaning.starts_with("c_t");
   const MatrixXd ones = MatrixXd::Ones(source.count(), 1);
   result.value = result.known = ones;
-  const bool reduced = is_reduced(source.table, choice);
+  const bool reduced = source.as_c_t;
   result.coefficient = result.coefficient || reduced;
   const std::string_view quantity = unit_from_name(column.unit).quantity;
   result.of_air = own && !reduced && (!column.meaning.empty() || quantity == "power" || quantity == "torque");
@@ -80,32 +80,24 @@ void set_response(const TableSource& source, const ObservationChoice& choice, Ob
       throw InputError::in(row.place, "the response {} is empty", result.response);
     if (!reduced) continue;
     const double density = dry_air_density_kg_m3(row.air_pressure_Pa, row.air_temperature_C + kZeroCelsius_K);
-    result.known(r, 0) =
-        density * std::pow(*row.speed_rpm / 60, 2) * std::pow(*row.diameter_m, 4);  // T = C_T ρ n² D⁴
+    result.known(r, 0) = density * std::pow(*row.speed_rpm / 60, 2) *
+                         std::pow(row.diameter_m.value_or(1), 4);  // T = C_T ρ n² D⁴
   }
 }
 
-/// A cell's volts scatter alike under any load; what a rotor gives scatters with its size.
-bool scatters_alike(const TableSchema& schema, const ObservationChoice& choice) {
-  if (!is_own_response(schema, choice) || choice.baseline.starts_with("power:")) return false;
-  if (!schema.scatter.empty()) return schema.scatter == "absolute";
-  return unit_from_name(schema.response.unit).quantity == "voltage";
-}
-
 /// The first row whose response has not the sign of most of its group.
-std::optional<Index> of_other_sign(const Observations& result) {
-  std::map<int, double> sign;
-  for (Index r = 0; r < result.value.rows(); ++r)
-    sign[result.group[static_cast<std::size_t>(r)]] += result.value(r, 0) > 0 ? 1 : -1;
-  for (Index r = 0; r < result.value.rows(); ++r)
-    if (result.value(r, 0) * sign[result.group[static_cast<std::size_t>(r)]] <= 0) return r;
-  return {};
+std::optional<Index> row_of_other_sign(const TableSource& source, const Observations& result) {
+  std::vector<std::string> group;
+  for (Index r = 0; r < source.count(); ++r) group.push_back(source.row(r).group);
+  const auto row =
+      of_other_sign(std::vector<double>(result.value.data(), result.value.data() + source.count()), group);
+  return row ? std::optional<Index>(static_cast<Index>(*row)) : std::nullopt;
 }
 
 /// Groups that pulled the other way are measured by magnitude; a response of both signs is kept as it is.
 /// Thrusts that scatter alike have an offset beside their C_T.
-void set_scale(Observations& result, bool alike) {
-  result.multiplicative = !alike && !of_other_sign(result);
+void set_scale(const TableSource& source, bool alike, Observations& result) {
+  result.multiplicative = !alike && !row_of_other_sign(source, result);
   if (result.multiplicative) {
     result.sign = result.value.array().sign();
     result.value = result.value.cwiseAbs();
@@ -311,7 +303,7 @@ void set_baseline(const TableSource& source, const ObservationChoice& choice, Ob
     result.known.setOnes();
   }
   if (kind == "power" && !result.multiplicative)
-    throw InputError::in(source.row(*of_other_sign(result)).place,
+    throw InputError::in(source.row(*row_of_other_sign(source, result)).place,
                          "--baseline {}: the response must have one sign", choice.baseline);
   result.slopes.resize(source.count(), 1);
   for (Index r = 0; r < source.count(); ++r) {
@@ -351,7 +343,7 @@ Observations observe_table(const ObservationTable& table, const ObservationChoic
     throw InputError(fmt::format("the response {} is the same in every row: there is nothing to explain",
                                  result.response));
   result.slopes.resize(source.count(), 0);
-  set_scale(result, scatters_alike(table.schema, choice));
+  set_scale(source, scatters_alike(table.schema, choice), result);
   add_covariates(source, result);
   set_previous(result);
   set_baseline(source, choice, result);

@@ -279,6 +279,7 @@ void estimate_on_all(const Models& models, const Seal& seal, const Observations&
   explanation.suspect_rows =
       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
   warn_of_alike_rows(observations, explanation);
+  warn_of_tares(wide, whole.model, explanation);
   warn_of_changes_at_steps(observations, explanation);
   number_change_points(observations, change_points, explanation);
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -40,12 +41,19 @@ bool is_own_response(const TableSchema& schema, const ObservationChoice& choice)
   return choice.response.empty() || choice.response == schema.response.column;
 }
 
-bool is_reduced(const ObservationTable& table, const ObservationChoice& choice) {
-  const TableSchema& schema = table.schema;
-  return is_own_response(schema, choice) && schema.response.meaning == "thrust_N" &&
-         choice.baseline.empty() && (schema.diameter_column || schema.diameter_m) &&
-         std::ranges::any_of(table.rows,
-                             [](const Observation& row) { return row.speed_rpm.value_or(0) > 0; });
+bool scatters_alike(const TableSchema& schema, const ObservationChoice& choice) {
+  if (!is_own_response(schema, choice) || choice.baseline.starts_with("power:")) return false;
+  if (!schema.scatter.empty()) return schema.scatter == "absolute";
+  return unit_from_name(schema.response.unit).quantity == "voltage";
+}
+
+std::optional<std::size_t> of_other_sign(const std::vector<double>& values,
+                                         const std::vector<std::string>& group) {
+  std::map<std::string, int> sign;
+  for (std::size_t r = 0; r < values.size(); ++r) sign[group[r]] += values[r] > 0 ? 1 : -1;
+  for (std::size_t r = 0; r < values.size(); ++r)
+    if (values[r] * sign[group[r]] <= 0) return r;
+  return {};
 }
 
 namespace {
@@ -57,33 +65,63 @@ std::string first_few(const std::vector<std::string>& rows) {
   return fmt::format(", {}{}", fmt::join(rows.begin(), end, ", "), rows.size() > kNamed ? " …" : "");
 }
 
+bool is_thrust_with_speed(const ObservationTable& table, const ObservationChoice& choice) {
+  return is_own_response(table.schema, choice) && table.schema.response.meaning == "thrust_N" &&
+         choice.baseline.empty() && std::ranges::any_of(table.rows, [](const Observation& row) {
+           return row.speed_rpm.value_or(0) > 0;
+         });
+}
+
+/// Of thrusts without a diameter: whether they have both signs or scatter alike, and most have a speed.
+bool have_a_tare(const ObservationTable& table, const ObservationChoice& choice,
+                 const std::vector<std::size_t>& rows) {
+  std::vector<double> thrust_N;
+  std::vector<std::string> group;
+  std::size_t with_speed = 0;
+  for (const std::size_t r : rows) {
+    thrust_N.push_back(table.rows[r].response);
+    group.push_back(table.rows[r].group);
+    with_speed += table.rows[r].speed_rpm.value_or(0) > 0 ? 1U : 0U;
+  }
+  return 2 * with_speed > rows.size() &&
+         (scatters_alike(table.schema, choice) || of_other_sign(thrust_N, group));
+}
+
+/// Leaves out rows for which `is_out` holds, and says which.
+template <class Rule>
+void leave_out(TableSource& source, const char* why, Observations& result, const Rule& is_out) {
+  std::vector<std::string> out;
+  std::erase_if(source.rows, [&](std::size_t r) {
+    const bool goes = is_out(source.table.rows[r]);
+    if (goes) out.push_back(source.table.rows[r].place);
+    return goes;
+  });
+  if (out.empty()) return;
+  result.left_out.push_back(
+      fmt::format("{} {}: {}{}", out.size(), out.size() == 1 ? "row" : "rows", why, first_few(out)));
+}
+
 }  // namespace
 
 TableSource used_rows(const ObservationTable& table, const ObservationChoice& choice, Observations& result) {
+  TableSource source{table, std::vector<std::size_t>(table.rows.size())};
+  std::iota(source.rows.begin(), source.rows.end(), 0U);
   const std::map<std::string, double> at_rest = resting_speeds_rpm(table);
-  const bool reduced = is_reduced(table, choice);
-  TableSource source{table, {}};
-  std::vector<std::string> resting, without_speed, without_air;
-  for (std::size_t r = 0; r < table.rows.size(); ++r) {
-    const Observation& row = table.rows[r];
-    const double rest_rpm = at_rest.at(row.group);
-    if (reduced && (!row.speed_rpm || rest_rpm == 0))
-      without_speed.push_back(row.place);
-    else if (row.speed_rpm && rest_rpm > 0 && *row.speed_rpm <= rest_rpm)
-      resting.push_back(row.place);
-    else if (reduced && (std::isnan(row.air_temperature_C) || std::isnan(row.air_pressure_Pa)))
-      without_air.push_back(row.place);
-    else
-      source.rows.push_back(r);
-  }
-  const auto say = [&](const std::vector<std::string>& rows, const char* why) {
-    if (rows.empty()) return;
-    result.left_out.push_back(fmt::format("{} {}: {}", rows.size(), rows.size() == 1 ? "row" : "rows", why) +
-                              first_few(rows));
-  };
-  say(resting, "the motor stood or its speed was not read (at most 5 % of what its group runs at)");
-  say(without_speed, "no speed was read, so there is no C_T");
-  say(without_air, "the temperature or the pressure of the air is empty, so there is no C_T");
+  leave_out(source, "the motor stood or its speed was not read (at most 5 % of what its group runs at)",
+            result, [&](const Observation& row) {
+              const double rest_rpm = at_rest.at(row.group);
+              return row.speed_rpm && rest_rpm > 0 && *row.speed_rpm <= rest_rpm;
+            });
+  const bool diameter = table.schema.diameter_column || table.schema.diameter_m;
+  source.as_c_t =
+      is_thrust_with_speed(table, choice) && (diameter || have_a_tare(table, choice, source.rows));
+  if (!source.as_c_t) return source;
+  leave_out(source, "no speed was read, so there is no C_T", result,
+            [&](const Observation& row) { return !row.speed_rpm || at_rest.at(row.group) == 0; });
+  leave_out(source, "the temperature or the pressure of the air is empty, so there is no C_T", result,
+            [](const Observation& row) {
+              return std::isnan(row.air_temperature_C) || std::isnan(row.air_pressure_Pa);
+            });
   return source;
 }
 

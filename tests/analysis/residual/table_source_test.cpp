@@ -19,6 +19,7 @@ using test::TablesTest;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 struct TableSourceTest : TablesTest {
   static constexpr const char* kThrustAndSpeed =
@@ -101,6 +102,29 @@ TEST_F(TableSourceTest, AZeroThatWasNotTakenOffAndACellThatBendsAreFoundInThrust
   std::vector<std::string> set = bent.adopted[1].confounded_with;
   set.push_back(bent.adopted[1].term.effect->name);
   EXPECT_THAT(set, Contains("nonlinearity"));
+}
+
+/// So large that small thrusts have the other sign: it is the baseline's then, and said.
+TEST_F(TableSourceTest, ThrustsOfBothSignsHaveATareBesideTheirC_T) {
+  const auto with = [&](double tare_N) {
+    std::string csv = "b,N,y\n";
+    for (int r = 0; r < 96; ++r) {
+      const double rpm = 1000 + 6000 * even(random);
+      csv += fmt::format("{},{},{}\n", r / 8, rpm,
+                         6 * std::pow(rpm / 5000, 2) + tare_N + 0.01 * scatter(random));
+    }
+    return csv;
+  };
+  for (const std::string propeller : {"", kPropeller}) {
+    const Explanation e = explained(observed(with(-1.5), kThrustAndSpeed + propeller));
+    EXPECT_EQ(e.verdict, "no_structure") << explanation_text(e);
+    EXPECT_LT(e.after.held_out_rmse, 0.02);
+    EXPECT_THAT(e.warnings, Contains(HasSubstr("a constant beside C_T, -1.5")));
+  }
+  std::string alike = kThrustAndSpeed;
+  alike.insert(alike.find("unit"), "scatter = \"absolute\"\n");
+  EXPECT_THAT(explained(observed(with(0), alike)).warnings,
+              Not(Contains(HasSubstr("a constant beside C_T"))));
 }
 
 /// The density that C_T is made with has the pressure; it is not sought again.
