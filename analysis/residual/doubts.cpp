@@ -40,9 +40,9 @@ void warn_of_doubts(Explanation& explanation) {
                     sealed.all, sealed.curves));
   else if (explanation.sealed.beyond_floor)
     explanation.warnings.push_back(
-        fmt::format("on the sealed blocks the error after is {:.2g} times the noise floor: something varies "
-                    "there that the model does not have",
-                    explanation.after.held_out_rmse / explanation.noise_floor));
+        fmt::format("on the sealed blocks the error with all that was found is {:.2g} times the noise floor: "
+                    "something else varies there",
+                    explanation.sealed.all / explanation.noise_floor));
   else if (worse && explanation.sealed.against_adopted)
     explanation.warnings.emplace_back(
         "on the sealed blocks the error is larger with what was adopted than without: doubt it");

@@ -23,7 +23,7 @@ struct SealedErrors {
   double names = 0, curves = 0, all = 0;
   /// Whether they speak against the names beside the curves, and against what was adopted.
   bool against_names = false, against_adopted = false;
-  /// Whether what was adopted leaves more there than the scatter it expects, and chance, do.
+  /// Whether all that was found leaves more there than the scatter it expects, and chance, do.
   bool beyond_floor = false;
 };
 

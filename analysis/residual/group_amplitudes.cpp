@@ -16,10 +16,21 @@ namespace {
 
 constexpr double kLeastSeen = 1e-6;  // of a column: below it what is left is rounding
 
+/// Places in `rows` of each block's, in their order.
+std::vector<std::vector<Index>> blocks_of(const Observations& observations, const std::vector<int>& rows) {
+  std::map<int, std::vector<Index>> blocks;
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    blocks[observations.block[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
+  std::vector<std::vector<Index>> result;
+  for (auto& [block, own] : blocks) result.push_back(std::move(own));
+  return result;
+}
+
 }  // namespace
 
 std::vector<GroupEstimate> estimate_by_group(const Observations& observations, const MeanModel& model,
-                                             std::size_t t, const std::vector<int>& rows) {
+                                             std::size_t t, const NullFit& variances,
+                                             const std::vector<int>& rows) {
   const auto own_amplitudes = [&](std::size_t end) {
     return std::count_if(model.terms.begin(), model.terms.begin() + static_cast<std::ptrdiff_t>(end),
                          [](const Term& term) { return term.per_group; });
@@ -31,18 +42,20 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
   for (const int row : rows) groups[observations.group[static_cast<std::size_t>(row)]].push_back(row);
   std::vector<GroupEstimate> result;
   for (const auto& [group, own] : groups) {
-    const VectorXd response = VectorXd(observations.y(own, 0)) - VectorXd(offset[0](own, 0));
-    const MatrixXd slopes = observations.slopes(own, Eigen::all);
-    const MatrixXd x = slopes.rowwise() - slopes.colwise().mean();
-    const VectorXd y = response.array() - response.mean();
-    MatrixXd others = x;
-    others.col(column).setZero();
+    const Index n = static_cast<Index>(own.size()), k = observations.slopes.cols();
+    MatrixXd items(n, k + 2);  // constant and other columns, then x and y
+    items << VectorXd::Ones(n), observations.slopes(own, Eigen::all),
+        observations.y(own, 0) - offset[0](own, 0);
+    items.col(1 + column).swap(items.col(k));
+    whiten(blocks_of(observations, own), observations.scatter.of_runs(own), kRatios[variances.ratio[0]], 0,
+           items);
     // What the group's other columns make of both is no part of the amplitude (Frisch & Waugh 1933).
+    const MatrixXd others = items.leftCols(k);
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(others);
-    const VectorXd seen = x.col(column) - others * solver.solve(x.col(column));
-    const VectorXd rest = y - others * solver.solve(y);
-    const Index dof = y.size() - 2 - solver.rank();
-    if (dof < 1 || !(seen.norm() > kLeastSeen * x.col(column).norm())) continue;
+    const MatrixXd left = items.rightCols(2) - others * solver.solve(items.rightCols(2));
+    const VectorXd seen = left.col(0), rest = left.col(1);
+    const Index dof = n - 1 - solver.rank();
+    if (dof < 1 || !(seen.norm() > kLeastSeen * items.col(k).norm())) continue;
     const double amplitude = seen.dot(rest) / seen.squaredNorm();
     const double variance = (rest - amplitude * seen).squaredNorm() / static_cast<double>(dof);
     const double half =

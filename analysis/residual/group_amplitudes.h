@@ -13,9 +13,11 @@ struct GroupEstimate {
   double value = 0, low = 0, high = 0;  // 95 %
 };
 
-/// Of term t of the model, from `rows`; without groups that have too few of them, or in which the baseline
-/// absorbs what the effect does (a moment that is always its force times one arm).
+/// Of term t of the model, from `rows`, which scatter as `variances` say; without groups that have too few of
+/// them, or in which the baseline absorbs what the effect does (a moment that is always its force times one
+/// arm).
 std::vector<GroupEstimate> estimate_by_group(const Observations& observations, const MeanModel& model,
-                                             std::size_t t, const std::vector<int>& rows);
+                                             std::size_t t, const NullFit& variances,
+                                             const std::vector<int>& rows);
 
 }  // namespace tunnelrig

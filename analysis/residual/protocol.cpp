@@ -47,15 +47,15 @@ bool speak_against(const HeldOutErrors& with, const HeldOutErrors& without) {
 }
 
 /// Whether errors are larger than runs of that scatter make them, by their blocks: each counts as one.
-bool is_beyond_floor(const Observations& observations, const ErrorEstimate& after, double noise_floor,
+bool is_beyond_floor(const Observations& observations, const ErrorEstimate& estimate, double noise_floor,
                      const std::vector<int>& scored) {
   constexpr double kFarAboveFloor = 1.25, kCertain = 0.99;
   if (!(noise_floor > 0)) return false;
   std::set<int> ids;
   for (const int row : scored) ids.insert(observations.block[static_cast<std::size_t>(row)]);
   const double blocks = static_cast<double>(ids.size());
-  const double ratio = after.held_out_rmse / noise_floor;
-  return after.held_out_low > kFarAboveFloor * noise_floor ||
+  const double ratio = estimate.held_out_rmse / noise_floor;
+  return estimate.held_out_low > kFarAboveFloor * noise_floor ||
          ratio * ratio > chi2_quantile(kCertain, blocks) / blocks;
 }
 
@@ -126,8 +126,9 @@ void report_adopted(const Observations& observations, const Attribution& found, 
                           .confounded_with = {},
                           .separating_run = {}};
     if (adopted.term.per_group)
-      adopted.parameters[0] = summary_of_groups(adopted.term.effect->parameters[0],
-                                                estimate_by_group(observations, whole.model, t, rows));
+      adopted.parameters[0] =
+          summary_of_groups(adopted.term.effect->parameters[0],
+                            estimate_by_group(observations, whole.model, t, whole.variances, rows));
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k)
       adopted.parameters[k].unit = unit_of(observations, adopted.term.effect->parameters[k]);
     for (const Ranked& rival : accepted.confounded)
@@ -245,8 +246,9 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
                         .against_names = speak_against(whole, curves),
                         .against_adopted = speak_against(after, before)};
   explanation.noise_floor = rms(whole.expected_std);
-  explanation.sealed.beyond_floor =
-      is_beyond_floor(alone, explanation.after, explanation.noise_floor, scored);
+  ErrorEstimate all;  // with the curves, whose structure is said
+  set_interval(alone, whole, settings.seed, all);
+  explanation.sealed.beyond_floor = is_beyond_floor(alone, all, explanation.noise_floor, scored);
   explanation.before.rmse = rms(residuals(alone, found.baseline, seal.open));
   explanation.after.rmse = rms(residuals(wide, shown, seal.open));
 }

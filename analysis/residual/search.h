@@ -82,7 +82,7 @@ class Search {
   /// In place of a candidate with amplitudes of the groups' own: the same effect alike in all, if α lets it
   /// in.
   std::size_t alike_instead(const Scan& scan, std::size_t i) const;
-  bool groups_within_bounds(const Observations& wider, const MeanModel& model) const;
+  bool groups_within_bounds(const Observations& wider, const JointFit& fit) const;
   bool another_does_as_well(const CrossValidation& own, const NullFit& variances) const;
   /// Whether it is one of the measured speed, of which the model does not have the square.
   bool lacks_speed_squared(const Term& term) const;

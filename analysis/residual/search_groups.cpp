@@ -79,7 +79,7 @@ std::optional<double> Search::gain_of(const InGroups& own, bool before_others) c
   const CrossValidation before = cross_validate(observations_, difference(y_, fit_.linear.offset),
                                                 fit_.linear.columns, fit.variances, rows_);
   const LossDifference gain = compare(before, after);
-  if (!(gain.mean > gain.standard_error) || !groups_within_bounds(own.observations, fit.model)) return {};
+  if (!(gain.mean > gain.standard_error) || !groups_within_bounds(own.observations, fit)) return {};
   if (before_others && another_does_as_well(after, fit.variances)) return {};
   return before.rmse() - after.rmse();
 }
@@ -143,10 +143,11 @@ bool Search::another_does_as_well(const CrossValidation& own, const NullFit& var
   return false;
 }
 
-bool Search::groups_within_bounds(const Observations& wider, const MeanModel& model) const {
+bool Search::groups_within_bounds(const Observations& wider, const JointFit& fit) const {
   constexpr std::size_t kOneOf = 20;  // 95 % intervals
+  const MeanModel& model = fit.model;
   const EffectParameter& amplitude = model.terms.back().effect->parameters[0];
-  const auto groups = estimate_by_group(wider, model, model.terms.size() - 1, rows_);
+  const auto groups = estimate_by_group(wider, model, model.terms.size() - 1, fit.variances, rows_);
   const auto outside = std::count_if(groups.begin(), groups.end(), [&](const GroupEstimate& group) {
     return group.low > amplitude.upper || group.high < amplitude.lower;
   });

@@ -117,6 +117,21 @@ TEST_F(ExplainTest, OneStrongEffectIsNamedAndExplained) {
   expect_contract(e);
 }
 
+/// A day that went wrong, and is seen by the seal alone.
+TEST_F(ExplainTest, WhatTheSealedBlocksHaveBeyondTheFloorIsSaid) {
+  const auto said = Contains(HasSubstr("times the noise floor"));
+  Observations o = observations(16);
+  EXPECT_THAT(explained(o).warnings, testing::Not(said));
+  const int day = o.block[static_cast<std::size_t>(seal_blocks(o, quick().seed).sealed.front())];
+  Eigen::MatrixXd y = o.y;
+  for (Eigen::Index run = 0; run < o.rows(); ++run)
+    if (o.block[static_cast<std::size_t>(run)] == day) y.row(run).array() += 0.04;
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  EXPECT_TRUE(e.adopted.empty());
+  EXPECT_THAT(e.warnings, said);
+}
+
 TEST_F(ExplainTest, TheSameSeedSaysTheSame) {
   Observations o = observations(10);
   test::add_effect(o, "supply_voltage", {0.1});

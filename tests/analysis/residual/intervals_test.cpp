@@ -69,5 +69,24 @@ TEST_F(Intervals, OfTheMedianOfGroupsHoldIt) {
   }
 }
 
+/// A day's weather, and the day's own scatter with it.
+TEST_F(Intervals, OfAGroupsAmplitudeAllowForSessions) {
+  constexpr int kSamples = 60, kGroups = 3;
+  int held = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    Observations o = test::simulate(
+        {.runs_of_block = std::vector<int>(14, 6), .groups = kGroups, .session_ratio = 2.5}, random);
+    o.slopes.resize(o.rows(), 1);
+    for (Eigen::Index run = 0; run < o.rows(); ++run)
+      o.slopes(run, 0) = run % 6 == 0 ? normal(1) : o.slopes(run - 1, 0);
+    const MeanModel model{
+        {{.effect = &test::effect_named("supply_voltage"), .per_group = true, .parameters = {0}}}, {}};
+    const JointFit fit = fit_jointly(o, model, o.all_rows());
+    for (const GroupEstimate& own : estimate_by_group(o, fit.model, 0, fit.variances, o.all_rows()))
+      held += own.low <= 0 && 0 <= own.high ? 1 : 0;
+  }
+  EXPECT_GT(held, 0.9 * kGroups * kSamples);
+}
+
 }  // namespace
 }  // namespace tunnelrig

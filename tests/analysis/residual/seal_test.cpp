@@ -48,7 +48,7 @@ TEST_F(SealTest, EveryLocationKeepsAnOpenRunWherePossible) {
   Observations observations = test::simulate({.runs_of_block = std::vector<int>(16, 6), .groups = 4}, random);
   // a location in one block of each quarter only
   observations.group_name.emplace_back("H9V9");
-  for (const std::size_t block : {1, 5, 9, 14}) observations.group[6 * block] = 4;
+  for (const std::size_t block : {1U, 5U, 9U, 14U}) observations.group[6 * block] = 4;
   observations.group_name.emplace_back("H8V8");  // and one that was visited once
   observations.group[6 * 3] = 5;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
