@@ -45,13 +45,30 @@ Observations observations_of_file(const ExplainOptions& options) {
   return observe_campaign(data, {options.response, options.baseline});
 }
 
+/// To a file, or for "-" to standard output.
+void put_json(const std::string& file, const std::string& json) {
+  if (file == "-")
+    fmt::print("{}\n", json);
+  else
+    write_text(file, json + "\n");
+}
+
 int list(const ExplainOptions& options) {
   const Candidates candidates(options.effects);
-  std::optional<Observations> observations;
-  if (!options.db.empty()) observations = observations_of_file(options);
-  const Observations* given = observations ? &*observations : nullptr;
-  fmt::print("{}\n", options.json.empty() ? candidates_text(candidates.all, given)
-                                          : candidates_json(candidates.all, given));
+  const auto say = [&](const std::vector<const Effect*>& effects, const CanBeFound* can_be_found) {
+    if (options.json.empty())
+      fmt::print("{}", candidates_text(effects, can_be_found));
+    else
+      put_json(options.json, candidates_json(effects, can_be_found));
+  };
+  if (options.db.empty()) {
+    say(candidates.all, nullptr);
+    return kWell;
+  }
+  const Observations observations = observations_of_file(options);
+  const TableEffects effects(observations, candidates.all);
+  const CanBeFound can_be_found(observations);
+  say(effects.all, &can_be_found);
   return kWell;
 }
 
@@ -98,11 +115,8 @@ int run_explain(ExplainOptions options) {
   const Explanation explanation = explain(observations, effects.all, options.search);
   for (const std::string& warning : explanation.warnings) warn(warning);
   const std::string json = explanation_json(explanation);
-  if (options.json == "-")
-    fmt::print("{}\n", json);
-  else
-    fmt::print("{}", explanation_text(explanation));
-  if (!options.json.empty() && options.json != "-") write_text(options.json, json + "\n");
+  if (options.json != "-") fmt::print("{}", explanation_text(explanation));
+  if (!options.json.empty()) put_json(options.json, json);
   if (!options.html.empty())
     write_text(options.html, explanation_html(explanation, observations, options.search,
                                               {options.db, program_version(), arguments(), now_utc()}));

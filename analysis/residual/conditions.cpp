@@ -22,29 +22,16 @@ using Eigen::VectorXd;
 namespace {
 
 std::vector<Untestable> untestable_effects(const Observations& observations,
-                                           const std::vector<const Effect*>& effects,
-                                           const std::vector<int>& rows) {
+                                           const std::vector<const Effect*>& effects) {
   std::map<std::string, std::vector<Untestable>> by_name;
   std::set<std::string> testable;
-  const MixedModel baseline = MixedModel::baseline_alone(observations, rows);
-  const OwnEvidence has_evidence(observations, baseline);
+  const CanBeFound can_be_found(observations);
   for (const Effect* effect : effects) {
-    const Testability can = testability(*effect, observations);
-    std::string reason = can.reason;
-    if (can.ok()) {
-      const std::vector<Term> ways = ways_to_try(*effect, observations, rows);
-      if (ways.empty()) reason = "there are too few blocks on both sides of any step";
-      const bool seen = std::any_of(ways.begin(), ways.end(), std::cref(has_evidence));
-      if (!seen && reason.empty())
-        reason = observations.from_table
-                     ? "it does not vary within any group beside the baseline, which absorbs it"
-                     : "it does not vary within any location, so the location's coefficient absorbs it";
-      if (seen) {
-        testable.insert(effect->name);
-        continue;
-      }
-    }
-    by_name[effect->name].push_back({effect->name, reason, can.missing});
+    const Testability can = can_be_found(*effect);
+    if (can.ok())
+      testable.insert(effect->name);
+    else
+      by_name[effect->name].push_back({effect->name, can.reason, can.missing});
   }
   std::vector<Untestable> result;
   for (auto& [name, list] : by_name)
@@ -144,9 +131,28 @@ std::optional<Index> changes_for_good(const Observations& observations, const Co
 
 }  // namespace
 
+CanBeFound::CanBeFound(const Observations& observations)
+    : observations_(observations),
+      rows_(observations.all_rows()),
+      baseline_(MixedModel::baseline_alone(observations, rows_)),
+      has_evidence_(observations, baseline_) {}
+
+Testability CanBeFound::operator()(const Effect& effect) const {
+  Testability can = testability(effect, observations_);
+  if (!can.ok()) return can;
+  const std::vector<Term> ways = ways_to_try(effect, observations_, rows_);
+  if (ways.empty())
+    can.reason = "there are too few blocks on both sides of any step";
+  else if (std::none_of(ways.begin(), ways.end(), std::cref(has_evidence_)))
+    can.reason = observations_.from_table
+                     ? "it does not vary within any group beside the baseline, which absorbs it"
+                     : "it does not vary within any location, so the location's coefficient absorbs it";
+  return can;
+}
+
 void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
                        const std::vector<int>& rows, Explanation& explanation) {
-  explanation.untestable = untestable_effects(observations, effects, rows);
+  explanation.untestable = untestable_effects(observations, effects);
   warn_of_unseen(observations, effects, rows, explanation);
   warn_of_collinear(observations, explanation);
 }

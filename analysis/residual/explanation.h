@@ -120,6 +120,22 @@ class TableEffects {
   std::vector<Effect> own_;
 };
 
+/// Whether an effect, in any of its ways, can be seen beside the baseline of these data, which must outlive
+/// it.
+class CanBeFound {
+ public:
+  explicit CanBeFound(const Observations& observations);
+  CanBeFound(const CanBeFound&) = delete;  // its parts refer to each other
+  CanBeFound& operator=(const CanBeFound&) = delete;
+  Testability operator()(const Effect& effect) const;
+
+ private:
+  const Observations& observations_;
+  std::vector<int> rows_;
+  MixedModel baseline_;
+  OwnEvidence has_evidence_;
+};
+
 /// The protocol: seal, search on the open runs, open the seal once, estimate on all.
 Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
                     const SearchSettings& settings);

@@ -27,7 +27,7 @@ std::string explanation_html(const Explanation& explanation, const Observations&
 
 /// Every candidate with formula, parameters, what it needs, and whether these data can test it (null: no
 /// data).
-std::string candidates_text(const std::vector<const Effect*>& effects, const Observations* observations);
-std::string candidates_json(const std::vector<const Effect*>& effects, const Observations* observations);
+std::string candidates_text(const std::vector<const Effect*>& effects, const CanBeFound* can_be_found);
+std::string candidates_json(const std::vector<const Effect*>& effects, const CanBeFound* can_be_found);
 
 }  // namespace tunnelrig

@@ -212,6 +212,8 @@ TEST_F(ExplainProgram, ListsCandidatesWithoutACampaign) {
   const ProgramResult here = run("explain --list --db c.db");
   EXPECT_EQ(here.code, 0);
   EXPECT_THAT(here.out, HasSubstr("not testable: not recorded: cable_force_N"));
+  EXPECT_EQ(run("explain --list --db c.db --json list.json").out, "");
+  EXPECT_TRUE(json::parse(read_text(folder / "list.json"))[0].contains("testable"));
 }
 
 }  // namespace

@@ -350,17 +350,22 @@ TEST_F(ExplainTest, CandidatesAreListedWithAndWithoutData) {
   for (const json& one : all)
     for (const char* key : {"effect", "form", "formula", "physics", "parameters", "covariates", "sign"})
       EXPECT_TRUE(one.contains(key)) << key;
-  const Observations o = observations(8);
-  for (const json& one : json::parse(candidates_json(test::every_effect(), &o))) {
+  Observations o = observations(8);
+  test::add_covariate(o, "ground_distance_R", 3, 3, random);
+  const CanBeFound can_be_found(o);
+  for (const json& one : json::parse(candidates_json(test::every_effect(), &can_be_found))) {
     if (one["effect"] == "supply_voltage") {
       EXPECT_TRUE(one["testable"]);
+    }
+    if (one["effect"] == "ground_effect") {
+      EXPECT_THAT(one["reason"].get<std::string>(), HasSubstr("does not vary within any location"));
     }
     if (one["effect"] == "cable_force") {
       EXPECT_FALSE(one["testable"]);
       EXPECT_EQ(one["missing"], json::array({"cable_force_N"}));
     }
   }
-  EXPECT_THAT(candidates_text(test::every_effect(), &o), HasSubstr("not recorded: cable_force_N"));
+  EXPECT_THAT(candidates_text(test::every_effect(), &can_be_found), HasSubstr("not recorded: cable_force_N"));
 }
 
 TEST_F(ExplainTest, RoundsKeepWhatTheySaw) {
