@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <stdexcept>
 
@@ -60,6 +61,23 @@ struct CandidateScan::Impl {
     std::vector<Stacked> data;
     for (std::size_t s = 0; s < model.strata().size(); ++s) data.push_back(model.stack(s, {&y}));
     return columns.times(data);
+  }
+
+  /// `sizes`: of the runs, as NullFit has them.
+  std::vector<Stacked> simulated(const NullFit& null, std::size_t count,
+                                 const std::vector<Eigen::MatrixXd>& sizes, std::mt19937_64& random) const {
+    std::vector<Stacked> data;
+    for (std::size_t s = 0; s < model.strata().size(); ++s) {
+      // The session variance is not known better than its likelihood says: each data set draws its own.
+      std::discrete_distribution<std::size_t> draw(null.ratio_probability[s].begin(),
+                                                   null.ratio_probability[s].end());
+      std::vector<std::size_t> ratio(count);
+      for (std::size_t& r : ratio) r = draw(random);
+      data.push_back(model.simulate(s, std::vector<double>(count, null.sigma[s]), ratio,
+                                    model.run_correlation(s), random,
+                                    sizes.empty() ? Eigen::MatrixXd() : sizes[s]));
+    }
+    return data;
   }
 
   struct State {
@@ -248,6 +266,53 @@ struct CandidateScan::Impl {
     result.amplitude = state.amplitude.tail(own);
     return result;
   }
+
+  /// One data set with so much of a candidate's column added to it.
+  Data planted(const Data& data, Index set, std::size_t candidate, double amplitude) const {
+    const Index column = columns.first(candidate);
+    Data result(data.size());
+    for (std::size_t s = 0; s < data.size(); ++s)
+      for (std::size_t ratio = 0; ratio < data[s].size(); ++ratio) {
+        const double own =
+            columns.touches(candidate, s) ? columns.products(s, ratio).candidate[candidate](0, 0) : 0;
+        const double with = data[s][ratio].columns(column, set);
+        result[s].push_back({data[s][ratio].squares.segment(set, 1), data[s][ratio].columns.col(set)});
+        result[s][ratio].squares(0) += amplitude * (2 * with + amplitude * own);
+        result[s][ratio].columns(column, 0) += amplitude * own;
+      }
+    return result;
+  }
+
+  /// By bisection between powers of two of the column's standard error; infinite where it is never reached.
+  double critical_amplitude(const Data& data, Index set, std::size_t candidate, double critical) const {
+    constexpr int kBisections = 7, kDoublings = 8;
+    const double sign = candidates[candidate].sign < 0 ? -1 : 1;
+    const auto reaches = [&](double amplitude) {
+      const Data with = planted(data, set, candidate, sign * amplitude);
+      return fit_candidate(with, 0, static_cast<int>(candidate), best_without(with, 0), critical).evidence >=
+             critical;
+    };
+    double high = standard_error(data, set, candidate);
+    int doublings = 0;
+    while (!reaches(high) && ++doublings <= kDoublings) high *= 2;
+    if (doublings > kDoublings) return std::numeric_limits<double>::infinity();
+    double low = doublings > 0 ? high / 2 : 0;
+    for (int step = 0; step < kBisections; ++step) {
+      const double middle = (low + high) / 2;
+      (reaches(middle) ? high : low) = middle;
+    }
+    return high;
+  }
+
+  /// Where runs are independent.
+  double standard_error(const Data& data, Index set, std::size_t candidate) const {
+    double information = 1e-300;
+    for (std::size_t s = 0; s < data.size(); ++s)
+      if (columns.touches(candidate, s))
+        information += columns.products(s, 0).candidate[candidate](0, 0) * static_cast<double>(model.dof(s)) /
+                       std::max(data[s][0].squares(set), 1e-300);
+    return 1 / std::sqrt(information);
+  }
 };
 
 CandidateScan::CandidateScan(const MixedModel& model, const std::vector<Components>& adopted,
@@ -289,18 +354,7 @@ std::vector<CandidateFit> CandidateScan::fit(const Components& y) const {
 
 std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::size_t count,
                                                     std::mt19937_64& random) const {
-  std::vector<Stacked> data;
-  for (std::size_t s = 0; s < impl_->model.strata().size(); ++s) {
-    // The session variance is not known better than its likelihood says: each data set draws its own.
-    std::discrete_distribution<std::size_t> draw(null.ratio_probability[s].begin(),
-                                                 null.ratio_probability[s].end());
-    std::vector<std::size_t> ratio(count);
-    for (std::size_t& r : ratio) r = draw(random);
-    data.push_back(impl_->model.simulate(s, std::vector<double>(count, null.sigma[s]), ratio,
-                                         impl_->model.run_correlation(s), random,
-                                         null.sizes.empty() ? Eigen::MatrixXd() : null.sizes[s]));
-  }
-  const Data products = impl_->columns.times(data);
+  const Data products = impl_->columns.times(impl_->simulated(null, count, null.sizes, random));
   std::vector<double> maxima(count, 0.0);
   in_two_threads(count, [&](std::size_t set) {
     const Impl::State state = impl_->best_without(products, static_cast<Index>(set));
@@ -314,6 +368,18 @@ std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::si
     }
   });
   return maxima;
+}
+
+Eigen::MatrixXd CandidateScan::critical_amplitudes(const NullFit& null, double critical, std::size_t count,
+                                                   std::mt19937_64& random) const {
+  const Data products = impl_->columns.times(impl_->simulated(null, count, {}, random));
+  Eigen::MatrixXd result(count, impl_->candidates.size());
+  in_two_threads(count, [&](std::size_t set) {
+    for (std::size_t i = 0; i < impl_->candidates.size(); ++i)
+      result(static_cast<Index>(set), static_cast<Index>(i)) =
+          impl_->critical_amplitude(products, static_cast<Index>(set), i, critical);
+  });
+  return result;
 }
 
 }  // namespace tunnelrig

@@ -48,6 +48,11 @@ class CandidateScan {
   /// The largest evidence among the candidates in `count` data sets drawn from a fitted null model.
   std::vector<double> simulated_maxima(const NullFit& null, std::size_t count, std::mt19937_64& random) const;
 
+  /// In as many data sets drawn likewise, of normal scatter: the amplitude (size) of each candidate's one
+  /// column at which its evidence is `critical`. Data sets × candidates; nothing may be adopted.
+  Eigen::MatrixXd critical_amplitudes(const NullFit& null, double critical, std::size_t count,
+                                      std::mt19937_64& random) const;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -119,11 +119,10 @@ class Search {
   void swap_weaker();
   double evidence_of(const Scan& scan, const Term& term) const;
   JointFit fit_without(std::size_t t) const;
-  /// What each effect must be to pass α four times in five.
+  /// What each effect must be to reach the critical evidence in four of five data sets drawn from the null
+  /// model (the typical one of its forms and shapes): of what varies from session to session far more is
+  /// needed than of what varies from run to run.
   void set_detectable(const Scan& scan);
-  /// rms of a candidate whose evidence is just enough: the variance that it adds counts against it, where
-  /// sessions are few.
-  double critical_rms(const Candidate& candidate, double amplitude, double error) const;
   double rms_of(const Eigen::MatrixXd& column) const;
   /// For the data that are drawn once more: scatter may go with anything, but what a candidate explains of
   /// the runs is none. Nothing of few runs, whose signs make too few data sets.

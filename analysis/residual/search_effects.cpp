@@ -310,8 +310,6 @@ JointFit Search::fit_without(std::size_t t) const {
   return fit_jointly(observations_, model, rows_);
 }
 
-/// Of what varies from session to session far more is needed than of what varies from run to run: so effect
-/// by effect, and the largest for all.
 void Search::set_detectable(const Scan& scan) {
   std::map<std::string, std::vector<std::pair<double, std::size_t>>> errors;  // rms of one; of each way
   for (std::size_t i = 0; i < scan.candidates.size(); ++i) {
@@ -323,30 +321,27 @@ void Search::set_detectable(const Scan& scan) {
     if (z > 0 && size > 0) errors[way.effect->name].emplace_back(size / z, i);
   }
   if (errors.empty()) return;
-  result_.detectable_sigma = 0;
+  std::vector<std::string> names;
+  std::vector<Candidate> typical;
   for (auto& [name, ways] : errors) {
     std::sort(ways.begin(), ways.end());
-    const auto [error, i] = ways[ways.size() / 2];
-    constexpr double kFourTimesInFive = 0.84;
-    const double needed =
-        critical_rms(scan.candidates[i], scan.fits[i].amplitude(0), error) + kFourTimesInFive * error;
-    result_.detectable_by_effect[name] = needed;
-    result_.detectable_sigma = std::max(result_.detectable_sigma, needed);
+    names.push_back(name);
+    typical.push_back(scan.candidates[ways[ways.size() / 2].second]);
   }
-}
-
-double Search::critical_rms(const Candidate& candidate, double amplitude, double error) const {
-  const CandidateScan alone(*mixed_, {}, {candidate});
-  const double unit = (candidate.sign < 0 ? -1 : 1) / rms_of(candidate.columns[0][0]);
-  double low = 0, high = 100 * error;
-  while (high - low > 0.1 * error) {
-    const double middle = (low + high) / 2;
-    Components planted = y_;  // in place of what is there already
-    for (std::size_t k = 0; k < planted.size(); ++k)
-      planted[k] += (middle * unit - amplitude) * candidate.columns[0][k];
-    (alone.fit(planted)[0].evidence < critical_ ? low : high) = middle;
+  constexpr std::size_t kDataSets = 100, kFourInFive = 80;
+  std::mt19937_64 random(settings_.seed);
+  const Eigen::MatrixXd amplitude =
+      CandidateScan(*mixed_, {}, typical).critical_amplitudes(fit_.variances, critical_, kDataSets, random);
+  double largest = 0;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    Eigen::VectorXd own = amplitude.col(static_cast<Index>(i));
+    std::nth_element(own.begin(), own.begin() + kFourInFive, own.end());
+    const double needed = own(kFourInFive) * rms_of(typical[i].columns[0][0]);
+    if (!std::isfinite(needed)) continue;
+    result_.detectable_by_effect[names[i]] = needed;
+    largest = std::max(largest, needed);
   }
-  return high;
+  if (largest > 0) result_.detectable_sigma = largest;
 }
 
 double Search::rms_of(const Eigen::MatrixXd& column) const {

@@ -76,6 +76,7 @@ TEST_F(Intervals, OfAGroupsAmplitudeAllowForSessions) {
   for (int i = 0; i < kSamples; ++i) {
     Observations o = test::simulate(
         {.runs_of_block = std::vector<int>(14, 6), .groups = kGroups, .session_ratio = 2.5}, random);
+    test::add_covariate(o, "supply_voltage_V", 15, 16, random);
     o.slopes.resize(o.rows(), 1);
     for (Eigen::Index run = 0; run < o.rows(); ++run)
       o.slopes(run, 0) = run % 6 == 0 ? normal(1) : o.slopes(run - 1, 0);

@@ -114,6 +114,40 @@ TEST_F(Statistics, NullCampaignsOfFourRotorsAreRarelyNamed) {
   EXPECT_LE(named, 7) << "binomial (100, 0.02): beyond 7 in 0.1 % of cases";
 }
 
+/// Of the runs' own scatter and of the sessions', which is known far less.
+TEST_F(Statistics, WhatWouldBeSeenIsSeenFourTimesInFive) {
+  SearchSettings settings;
+  settings.simulations = 199;
+  constexpr int kCampaigns = 20;
+  for (const char* name : {"supply_voltage", "air_pressure"}) {
+    int seen = 0;
+    for (int i = 0; i < kCampaigns; ++i) {
+      Observations o = campaign(0.4, 4, 0);
+      settings.seed = static_cast<std::uint64_t>(i) + 1;
+      const double size =
+          attribute(o, o.all_rows(), test::every_effect(), settings).detectable_by_effect.at(name);
+      const Term term{.effect = &test::effect_named(name), .parameters = {0}};
+      MatrixXd column = respond(term, o, o.value).derivative[0][0];
+      for (int g = 0; g < o.groups(); ++g) {
+        std::vector<int> rows;
+        for (const int row : o.all_rows())
+          if (o.group[static_cast<std::size_t>(row)] == g) rows.push_back(row);
+        column(rows, Eigen::all).rowwise() -= Eigen::RowVectorXd(column(rows, Eigen::all).colwise().mean());
+      }
+      const double rms = std::sqrt(column.squaredNorm() / static_cast<double>(column.size()));
+      const Observations again = campaign(0.4, 4, 0);
+      MatrixXd y = again.y + size / rms * column;
+      for (const int row : o.all_rows())
+        y.row(row).array() -= 0.01 * again.group[static_cast<std::size_t>(row)];
+      test::set_y(o, y);
+      const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
+      seen += found.accepted.empty() && found.curves.empty() ? 0 : 1;
+    }
+    std::cout << name << ": " << seen << " of " << kCampaigns << " seen\n";
+    EXPECT_GE(seen, 10) << "binomial (20, 0.8): below 10 in 0.06 % of cases";
+  }
+}
+
 /// What drifts within a session goes with scatter that drifts too.
 TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
   SearchSettings settings;
