@@ -191,7 +191,26 @@ int Sheet::require_integer(std::size_t row, std::string_view column, int lowest,
   return static_cast<int>(value);
 }
 
-Sheet parse_csv(std::string_view text, const std::string& file) {
+namespace {
+
+/// Puts together what commas within the free text have parted.
+void join_free_text(std::vector<std::string>& cells, const std::vector<std::string>& columns,
+                    std::string_view free_text) {
+  const auto column = std::find(columns.begin(), columns.end(), free_text);
+  const bool last =
+      column != columns.end() &&
+      std::all_of(column + 1, columns.end(), [](const std::string& name) { return name.empty(); });
+  if (!last) return;
+  const auto at = cells.begin() + (column - columns.begin());
+  while (cells.size() > columns.size()) {
+    *at += "," + *(at + 1);
+    cells.erase(at + 1);
+  }
+}
+
+}  // namespace
+
+Sheet parse_csv(std::string_view text, const std::string& file, std::string_view free_text) {
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   check_encoding(text, file);
   Sheet sheet{.file = file, .columns = {}, .rows = {}};
@@ -204,6 +223,7 @@ Sheet parse_csv(std::string_view text, const std::string& file) {
     const int line = scanner.line();
     std::vector<std::string> cells = scanner.record();
     if (cells.size() == 1 && trimmed(cells[0]).empty() && sheet.columns.size() > 1) continue;
+    if (!free_text.empty()) join_free_text(cells, sheet.columns, free_text);
     if (cells.size() != sheet.columns.size()) {
       throw InputError::at(file, line, "{} cells where the header has {} columns{}", cells.size(),
                            sheet.columns.size(), separator_advice(sheet.columns));
@@ -213,7 +233,9 @@ Sheet parse_csv(std::string_view text, const std::string& file) {
   return sheet;
 }
 
-Sheet read_csv(const std::filesystem::path& path) { return parse_csv(read_text(path), path.string()); }
+Sheet read_csv(const std::filesystem::path& path, std::string_view free_text) {
+  return parse_csv(read_text(path), path.string(), free_text);
+}
 
 std::string format_csv(const Sheet& sheet) {
   std::string out;

@@ -55,10 +55,11 @@ std::string_view separator_advice(const std::vector<std::string>& columns);
 
 /// Parses CSV text. Throws InputError for a missing header, a column named twice or not at all, a row of
 /// the wrong length, an unclosed quote, or text that is not UTF-8.
-Sheet parse_csv(std::string_view text, const std::string& file);
+/// `free_text`: a column, the last with a name, whose text may hold commas that no quotes protect.
+Sheet parse_csv(std::string_view text, const std::string& file, std::string_view free_text = {});
 
 /// Reads and parses a file; messages name its path as given.
-Sheet read_csv(const std::filesystem::path& path);
+Sheet read_csv(const std::filesystem::path& path, std::string_view free_text = {});
 
 /// RFC 4180 text of the sheet, quoting only the cells that need it, lines ending in \n.
 std::string format_csv(const Sheet& sheet);

@@ -7,6 +7,8 @@
 namespace tunnelrig {
 namespace {
 
+constexpr std::string_view kMessage = "App message";  // in the program's own words, commas and all
+
 std::vector<std::filesystem::path> sweep_files(const std::filesystem::path& source) {
   std::vector<std::filesystem::path> files;
   std::error_code error;
@@ -111,7 +113,7 @@ ObservationTable read_rcbenchmark(const std::filesystem::path& source, const Swe
   }
   Sheet all{.file = source.string(), .columns = {"file"}, .rows = {}};
   for (const auto& path : sweep_files(source))
-    append_sweep(all, read_csv(path), sweeps, path.filename().string());
+    append_sweep(all, read_csv(path, kMessage), sweeps, path.filename().string());
   const std::string toml =
       options.schema.empty() ? sweep_schema(all, options, source.string()) : read_text(options.schema);
   const std::string name = options.schema.empty() ? "the headers' schema" : options.schema.string();

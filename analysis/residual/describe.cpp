@@ -1,5 +1,6 @@
 // Structure without a name, as a curve with its band.
 #include "analysis/residual/explanation_parts.h"
+#include "calibration/distributions.h"
 
 #include <algorithm>
 #include <cmath>
@@ -174,7 +175,8 @@ UnknownStructure describe_sessions(const Observations& observations, const Matri
     const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
     double squares = 0;
     for (const double value : values) squares += (value - mean) * (value - mean);
-    const double half = 1.96 * std::sqrt(squares / std::max(1.0, n - 1) / n);
+    const double free = std::max(1.0, n - 1);
+    const double half = student_t_quantile(0.975, free) * std::sqrt(squares / free / n);
     result.shape.push_back({static_cast<double>(block + 1), mean, mean - half, mean + half});
     lowest = std::min(lowest, mean);
     highest = std::max(highest, mean);

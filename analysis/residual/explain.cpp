@@ -167,7 +167,9 @@ Observations without_set_aside(const Observations& observations, const Explanati
   std::vector<SuspectRow> aside;
   for (const SuspectRow& row : explanation.suspect_rows)
     if (row.set_aside) aside.push_back(row);
-  return aside.empty() ? observations : observations.subset(rows_but(observations, aside));
+  Observations result = aside.empty() ? observations : observations.subset(rows_but(observations, aside));
+  result.scatter = explanation.scatter;
+  return result;
 }
 
 Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,

@@ -103,6 +103,7 @@ struct Explanation {
   // what the pages show beside it
   std::vector<Round> rounds, curve_rounds;
   MeanModel model;                                  // fitted to all runs
+  RunScatter scatter;                               // that they were found to have
   Eigen::MatrixXd residual_before, residual_after;  // n × c, unit of the response
 };
 
@@ -140,7 +141,7 @@ class CanBeFound {
 Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
                     const SearchSettings& settings);
 
-/// The rows that the explanation's model and residuals are of.
+/// The rows that the explanation's model and residuals are of, with the scatter that they were found to have.
 Observations without_set_aside(const Observations& observations, const Explanation& explanation);
 
 /// A parameter's unit on these data: without a calibration there are no volts, and what would be volts is in

@@ -262,6 +262,7 @@ void estimate_on_all(const Models& models, const Seal& seal, const Observations&
       fit_jointly(wide, with_change_points_of_all(wide, found.final.model, seal.open, change_points), rows);
   const JointFit whole_baseline = fit_jointly(alone, {}, rows);
   explanation.model = whole.model;
+  explanation.scatter = wide.scatter;
   explanation.residual_before = residuals(alone, whole_baseline, rows);
   const HeldOutErrors fitted = score(wide, whole, whole.variances, rows, rows);
   explanation.residual_after = fitted.error;
@@ -281,6 +282,7 @@ void estimate_on_all(const Models& models, const Seal& seal, const Observations&
   explanation.suspect_rows =
       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
   warn_of_alike_rows(observations, explanation);
+  warn_of_companions(wide, whole.model, explanation);
   warn_of_tares(wide, whole.model, explanation);
   warn_of_changes_at_steps(observations, explanation);
   number_change_points(observations, change_points, explanation);

@@ -101,6 +101,31 @@ void leave_out(TableSource& source, const char* why, Observations& result, const
       fmt::format("{} {}: {}{}", out.size(), out.size() == 1 ? "row" : "rows", why, first_few(out)));
 }
 
+/// A speed that a few rows lack would be no condition at all.
+void leave_out_few_without_speed(TableSource& source, Observations& result) {
+  constexpr std::ptrdiff_t kOneOf = 10;
+  const auto lacks = [](const Observation& row) { return !row.speed_rpm; };
+  const auto without = std::count_if(source.rows.begin(), source.rows.end(),
+                                     [&](std::size_t r) { return lacks(source.table.rows[r]); });
+  if (kOneOf * without <= std::ssize(source.rows))
+    leave_out(source, "no speed was read, as in all others", result, lacks);
+}
+
+/// Rows that stand twice count as two measurements.
+void say_duplicates(const TableSource& source, Observations& result) {
+  constexpr std::size_t kOneOf = 20;
+  std::map<std::vector<std::string>, std::size_t> first;
+  std::vector<std::string> again;
+  for (const std::size_t r : source.rows)
+    if (!first.emplace(source.table.sheet.rows[r].cells, r).second)
+      again.push_back(source.table.rows[r].place);
+  if (again.empty() || again.size() * kOneOf < source.rows.size()) return;
+  result.left_out.push_back(fmt::format(
+      "{} {} the same in every column as another, and count as measured anew: if they were entered "
+      "twice, every p is too small{}",
+      again.size(), again.size() == 1 ? "row is" : "rows are", first_few(again)));
+}
+
 }  // namespace
 
 TableSource used_rows(const ObservationTable& table, const ObservationChoice& choice, Observations& result) {
@@ -115,13 +140,18 @@ TableSource used_rows(const ObservationTable& table, const ObservationChoice& ch
   const bool diameter = table.schema.diameter_column || table.schema.diameter_m;
   source.as_c_t =
       is_thrust_with_speed(table, choice) && (diameter || have_a_tare(table, choice, source.rows));
-  if (!source.as_c_t) return source;
+  if (!source.as_c_t) {
+    if (is_thrust_with_speed(table, choice)) leave_out_few_without_speed(source, result);
+    say_duplicates(source, result);
+    return source;
+  }
   leave_out(source, "no speed was read, so there is no C_T", result,
             [&](const Observation& row) { return !row.speed_rpm || at_rest.at(row.group) == 0; });
   leave_out(source, "the temperature or the pressure of the air is empty, so there is no C_T", result,
             [](const Observation& row) {
               return std::isnan(row.air_temperature_C) || std::isnan(row.air_pressure_Pa);
             });
+  say_duplicates(source, result);
   return source;
 }
 

@@ -113,6 +113,19 @@ TEST(Rcbenchmark, TakesSpeedFromTheProbeThatWasThere) {
   EXPECT_NEAR(table.rows[1].response, 0.04 * 9.80665, 1e-12);
 }
 
+TEST(Rcbenchmark, MessagesMayHoldCommas) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "s.csv",
+             "Thrust (N),Motor Optical Speed (RPM),App message,\n1,3000,,\n2,4000,\"Cutoff, by you\",\n"
+             "3,5000,Burst current, 12 A, 3 s,\n");
+  const auto table = read_rcbenchmark(folder / "s.csv", {});
+  ASSERT_EQ(table.rows.size(), 3u);
+  EXPECT_EQ(table.sheet.text(1, "App message"), "Cutoff, by you");
+  EXPECT_EQ(table.sheet.text(2, "App message"), "Burst current, 12 A, 3 s");
+  write_text(folder / "s.csv", "Thrust (N),Motor Optical Speed (RPM),App message,\n1,3000\n");
+  EXPECT_THAT(message_of([&] { read_rcbenchmark(folder / "s.csv", {}); }), HasSubstr("s.csv:2: 2 cells"));
+}
+
 TEST(Rcbenchmark, SweepsTableNamesGroups) {
   const test::TemporaryFolder folder;
   std::filesystem::create_directory(folder / "in");

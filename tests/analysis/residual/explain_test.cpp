@@ -188,6 +188,25 @@ TEST_F(ExplainTest, StructureWithoutANameIsUnknown) {
 }
 
 /// A switch, or a few settings: nothing lies between them, and no wave or bend sees them.
+TEST_F(ExplainTest, SessionsThatDifferByFarMoreThanTheirRunsAreUnknown) {
+  const auto with = [&](double session_ratio) {
+    return explained(test::simulate(
+        {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .session_ratio = session_ratio}, random));
+  };
+  EXPECT_EQ(with(0.4).verdict, "no_structure");
+  const Explanation e = with(25);
+  EXPECT_EQ(e.verdict, "unknown");
+  ASSERT_EQ(e.unknown.size(), 1u);
+  EXPECT_EQ(e.unknown[0].covariate, "session");
+  ASSERT_EQ(e.unknown[0].shape.size(), 16u) << "one point of each session";
+  for (const auto& [x, y, low, high] : e.unknown[0].shape) {
+    EXPECT_LT(low, y);
+    EXPECT_LT(high - low, 0.05) << "runs of 14 mN on the mean of four rotors and eight runs";
+  }
+  EXPECT_GT(e.unknown[0].amplitude, 0.02) << "sessions of 35 mN";
+  expect_contract(e);
+}
+
 TEST_F(ExplainTest, FewValuesAreHeldAgainstEachOther) {
   for (const int values : {2, 3, 5}) {
     Observations o = observations(16);
@@ -302,6 +321,27 @@ TEST_F(ExplainTest, EffectsThatGoTogetherAreConfounded) {
 }
 
 /// One that would need an exponent of 25 for the same is no rival.
+/// Of the battery's charge no effect is known, but it sinks with the voltage.
+TEST_F(ExplainTest, AConditionWithoutANameThatGoesWithANamedOneIsSaid) {
+  Observations o = observations(16);
+  test::add_effect(o, "supply_voltage", {0.12});  // six standard errors or so
+  const Eigen::VectorXd volts = o.find("supply_voltage_V")->value.col(0);
+  const auto with_charge = [&](double scatter_V) {
+    Observations both = o;
+    std::normal_distribution<double> normal(0, scatter_V);
+    Covariate charge{"battery_charge", volts};
+    for (double& value : charge.value.reshaped()) value += normal(random);
+    both.covariates.push_back(charge);
+    return explained(both);
+  };
+  const auto said = Contains(HasSubstr("battery_charge go together"));
+  const Explanation near = with_charge(0.02), far = with_charge(0.6);
+  ASSERT_EQ(near.adopted.size(), 1u);
+  EXPECT_EQ(near.adopted[0].term.effect->name, "supply_voltage");
+  EXPECT_THAT(near.warnings, said);
+  EXPECT_THAT(far.warnings, testing::Not(said));
+}
+
 TEST_F(ExplainTest, RivalsStayWithinTheirBounds) {
   Observations o = observations(16);
   Covariate excitation = *o.find("supply_voltage_V");

@@ -90,6 +90,7 @@ TEST_F(Scatter, OfOneRotorIsSaidAndIsNoStructure) {
   EXPECT_EQ(e.verdict, "no_structure");
   EXPECT_THAT(e.warnings, testing::Contains(testing::HasSubstr("rotors scatter unlike each other")));
   EXPECT_TRUE(e.suspect_rows.empty()) << "its runs are judged by its own scatter";
+  EXPECT_GT(without_set_aside(o, e).scatter.rotors.size(), 0) << "a model that is adopted is fitted with it";
 }
 
 TEST_F(Scatter, OfOneRotorDoesNotHideAnEffectOnIt) {

@@ -67,7 +67,8 @@ TEST_F(TableSourceTest, RowsWithoutASpeedHaveNoC_TAndAreSaid) {
                                       "its group runs at), t.csv:108",
                                       "10 rows: no speed was read, so there is no C_T, t.csv:98, t.csv:99, "
                                       "t.csv:100, t.csv:101 …"));
-  EXPECT_EQ(observed(csv, schema).rows(), 106);  // they do have a thrust
+  EXPECT_EQ(observed(csv, schema).rows(), 105)
+      << "a day without speeds has its thrusts; one empty cell is left out";
 }
 
 /// The others do not rest because one reading is forty times theirs.
@@ -102,6 +103,23 @@ TEST_F(TableSourceTest, AZeroThatWasNotTakenOffAndACellThatBendsAreFoundInThrust
   std::vector<std::string> set = bent.adopted[1].confounded_with;
   set.push_back(bent.adopted[1].term.effect->name);
   EXPECT_THAT(set, Contains("nonlinearity"));
+}
+
+TEST_F(TableSourceTest, RowsThatStandTwiceAreSaid) {
+  std::string csv = thrusts();
+  EXPECT_THAT(observed(csv, kThrustAndSpeed).left_out, testing::IsEmpty());
+  csv += csv.substr(csv.find('\n') + 1);
+  EXPECT_THAT(observed(csv, kThrustAndSpeed).left_out,
+              ElementsAre(HasSubstr("96 rows are the same in every column as another")));
+}
+
+TEST_F(TableSourceTest, AFewRowsWithoutASpeedAreLeftOut) {
+  std::string csv = thrusts();
+  for (int row = 0; row < 3; ++row) csv += fmt::format("1,,{}\n", 5 + row);
+  const Observations o = observed(csv, kThrustAndSpeed);
+  EXPECT_EQ(o.rows(), 96);
+  EXPECT_THAT(o.left_out, ElementsAre(HasSubstr("3 rows: no speed was read, as in all others")));
+  EXPECT_FALSE(o.not_usable.contains("speed_rpm"));
 }
 
 /// So large that small thrusts have the other sign: it is the baseline's then, and said.
