@@ -95,7 +95,7 @@ def rivals(explanations):
 def line(data, hold_out, explanations, scales, goal="", limit=None, unit="%", also=True, remark=""):
     """A row of the table; of several explanations the medians. `scales` convert errors to `unit`."""
     scales = list(scales)
-    middle = lambda of: statistics.median(scale(of(e)) for e, scale in zip(explanations, scales))
+    middle = lambda of: statistics.median(scale(of(e)) for e, scale in zip(explanations, scales, strict=True))
     after = middle(lambda e: e["after"]["held_out_rmse"])
     met = "" if not goal else "met" if (limit is None or after <= limit) and also else "NOT MET"
     verdict = counted([e["verdict"] for e in explanations], 4)
