@@ -144,9 +144,10 @@ double correlation_beside(const MixedModel& baseline, const Components& a, const
 }
 
 /// Conditions that no effect is known to follow: what they may do has no name to be confounded with.
-std::vector<const Covariate*> without_effects(const Observations& observations) {
+std::vector<const Covariate*> without_effects(const Observations& observations,
+                                              const std::vector<const Effect*>& effects) {
   std::set<std::string> named;
-  for (const Effect& effect : all_effects()) named.insert(effect.covariates.begin(), effect.covariates.end());
+  for (const Effect* effect : effects) named.insert(effect->covariates.begin(), effect->covariates.end());
   std::vector<const Covariate*> result;
   for (const Covariate& covariate : observations.covariates)
     if (!covariate.derived && !covariate.per_channel() && covariate.labels.empty() &&
@@ -157,27 +158,27 @@ std::vector<const Covariate*> without_effects(const Observations& observations) 
 
 }  // namespace
 
-void warn_of_companions(const Observations& observations, const MeanModel& model, Explanation& explanation) {
-  constexpr double kTold = 3;  // standard errors
-  const std::vector<const Covariate*> others = without_effects(observations);
+void warn_of_companions(const Observations& observations, const std::vector<const Effect*>& effects,
+                        Explanation& explanation) {
+  constexpr double kTold = 3;        // standard errors
+  constexpr double kTogether = 0.7;  // half of the one's variance is the other's
+  const std::vector<const Covariate*> others = without_effects(observations, effects);
   if (others.empty()) return;
   const std::vector<int> rows = observations.all_rows();
   const MixedModel baseline = MixedModel::baseline_alone(observations, rows);
-  const Forces forces = predict_forces(observations, model, rows);
+  const Forces forces = predict_forces(observations, explanation.model, rows);
   for (std::size_t t = 0; t < explanation.adopted.size(); ++t) {
     const AdoptedEffect& adopted = explanation.adopted[t];
     const ParameterEstimate& amplitude = adopted.parameters[0];
     if (adopted.term.per_group || amplitude.theory || !(amplitude.standard_error > 0)) continue;
     const Components own = respond(adopted.term, observations, forces.acted_on[t]).value;
     for (const Covariate* other : others) {
-      const auto& names = adopted.term.effect->covariates;
-      if (std::find(names.begin(), names.end(), other->name) != names.end()) continue;
       Components column(own.size(), Eigen::MatrixXd::Zero(observations.rows(), observations.channels()));
       for (Index c = 0; c < observations.channels(); ++c)
         if (adopted.term.rotor < 0 || c == adopted.term.rotor) column[0].col(c) = other->value.col(0);
       const double together = correlation_beside(baseline, own, column);
       const double told = amplitude.value / amplitude.standard_error * std::sqrt(1 - together * together);
-      if (std::abs(told) > kTold) continue;
+      if (std::abs(together) < kTogether || std::abs(told) > kTold) continue;
       explanation.warnings.push_back(
           fmt::format("{} and {} go together here (correlation {:.2f}): what {} does may be the work of {}",
                       adopted.term.label(), other->name, together, adopted.term.label(), other->name));

@@ -36,9 +36,10 @@ void warn_of_doubts(Explanation& explanation);
 void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
                          Explanation& explanation);
 
-/// Conditions that no effect is known to follow, and that go with an adopted effect so nearly that its size,
-/// by its own error, does not tell the two.
-void warn_of_companions(const Observations& observations, const MeanModel& model, Explanation& explanation);
+/// Conditions that none of the candidates follows, and that go with an adopted effect so nearly that its
+/// size, by its own error, does not tell the two.
+void warn_of_companions(const Observations& observations, const std::vector<const Effect*>& effects,
+                        Explanation& explanation);
 
 /// Constants of a table's thrusts beside their C_T, where the baseline has them.
 void warn_of_tares(const Observations& observations, const MeanModel& model, Explanation& explanation);

@@ -282,7 +282,6 @@ void estimate_on_all(const Models& models, const Seal& seal, const Observations&
   explanation.suspect_rows =
       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
   warn_of_alike_rows(observations, explanation);
-  warn_of_companions(wide, whole.model, explanation);
   warn_of_tares(wide, whole.model, explanation);
   warn_of_changes_at_steps(observations, explanation);
   number_change_points(observations, change_points, explanation);
@@ -314,6 +313,7 @@ Explanation explain_once(const Observations& observations, const std::vector<con
   open_seal(models, seal, settings, explanation);
   settings.progress("estimating parameters");
   estimate_on_all(models, seal, observations, explanation);
+  warn_of_companions(found.observations, effects, explanation);
   explanation.verdict = verdict_of(explanation);
   return explanation;
 }
