@@ -201,6 +201,17 @@ double CrossValidation::rmse() const {
   return count == 0 ? kNaN : std::sqrt(squares / static_cast<double>(count));
 }
 
+HeldOutErrors CrossValidation::all() const {
+  HeldOutErrors result;
+  for (const HeldOutErrors& fold : folds) {
+    const Index before = result.error.rows();
+    result.rows.insert(result.rows.end(), fold.rows.begin(), fold.rows.end());
+    result.error.conservativeResize(before + fold.error.rows(), fold.error.cols());
+    result.error.bottomRows(fold.error.rows()) = fold.error;
+  }
+  return result;
+}
+
 VectorXd CrossValidation::losses() const {
   VectorXd result(static_cast<Index>(folds.size()));
   for (std::size_t fold = 0; fold < folds.size(); ++fold)

@@ -45,6 +45,7 @@ struct CrossValidation {
   std::vector<HeldOutErrors> folds;
 
   double rmse() const;
+  HeldOutErrors all() const;       // rows and errors of all folds
   Eigen::VectorXd losses() const;  // of the folds
 };
 CrossValidation cross_validate(const Observations& observations, const Components& y,

@@ -93,16 +93,18 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
   const JointFit fit = fit_jointly(observations, {}, rows);
   explanation.residual_before = explanation.residual_after = residuals(observations, fit, rows);
   explanation.before.rmse = rms(explanation.residual_before);
-  explanation.before.held_out_rmse = explanation.before.held_out_low = explanation.before.held_out_high =
-      explanation.before.rmse;
   explanation.noise_floor = explanation.before.rmse;
+  HeldOutErrors errors{.rows = rows,
+                       .error = explanation.residual_before,
+                       .expected_std = {},
+                       .whitened = {},
+                       .amplitude = {}};
   if (observations.blocks() > 1) {
-    const CrossValidation validation =
-        cross_validate(observations, response_components(observations), {}, fit.variances, rows);
-    if (const double rmse = validation.rmse(); !std::isnan(rmse))
-      explanation.before.held_out_rmse = explanation.before.held_out_low = explanation.before.held_out_high =
-          rmse;
+    const HeldOutErrors left_out =
+        cross_validate(observations, response_components(observations), {}, fit.variances, rows).all();
+    if (left_out.count() > 0) errors = left_out;
   }
+  set_interval(observations, errors, settings.seed, explanation.before);
   explanation.after = explanation.before;
   explanation.detectable =
       scale_of(observations) *

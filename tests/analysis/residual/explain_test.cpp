@@ -147,6 +147,8 @@ TEST_F(ExplainTest, FiveBlocksOrFewerAreInsufficientAlways) {
     EXPECT_TRUE(e.adopted.empty());
     EXPECT_EQ(e.after.held_out_rmse, e.before.held_out_rmse);
     EXPECT_GT(e.before.rmse, 0);
+    EXPECT_LT(e.before.held_out_low, 0.95 * e.before.held_out_rmse);
+    EXPECT_GT(e.before.held_out_high, 1.05 * e.before.held_out_rmse);
     expect_contract(e);
   }
   EXPECT_NE(explained(observations(6)).verdict, "insufficient");
