@@ -1,8 +1,7 @@
-#include "analysis/air.h"
 #include "analysis/residual/expression.h"
 #include "analysis/residual/observations.h"
 #include "analysis/residual/parts_of_equal_size.h"
-#include "analysis/residual/table_source.h"
+#include "analysis/residual/table_response.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include <set>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace tunnelrig {
 namespace {
@@ -21,13 +21,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-/// What the schema says of a column; a pure number where it says nothing.
-TableColumn described(const TableSchema& schema, const std::string& name) {
-  for (const TableColumn& column : schema.covariates)
-    if (column.column == name) return column;
-  return {.column = name, .unit = "1", .meaning = ""};
-}
 
 /// A covariate's name: what it means where the schema says so, else its column.
 void add_covariates(const TableSource& source, Observations& result) {
@@ -57,56 +50,6 @@ void add_covariates(const TableSource& source, Observations& result) {
         !schema.diameter_column);
   if (result.find("air_temperature_C") == nullptr) result.assumed.insert("air_temperature_C");
   add("air_temperature_C", "°C", [&](Index r) { return source.row(r).air_temperature_C; });
-}
-
-void set_response(const TableSource& source, const ObservationChoice& choice, Observations& result) {
-  const TableSchema& schema = source.table.schema;
-  const bool own = is_own_response(schema, choice);
-  const TableColumn column = own ? schema.response : described(schema, choice.response);
-  result.response = column.column;
-  source.table.sheet.require(column.column);
-  result.unit = unit_after_conversion(column.unit);
-  result.coefficient = own && column.meaning.starts_with("c_t");
-  const MatrixXd ones = MatrixXd::Ones(source.count(), 1);
-  result.value = result.known = ones;
-  const bool reduced = source.as_c_t;
-  result.coefficient = result.coefficient || reduced;
-  const std::string_view quantity = unit_from_name(column.unit).quantity;
-  result.of_air = own && !reduced && (!column.meaning.empty() || quantity == "power" || quantity == "torque");
-  for (Index r = 0; r < source.count(); ++r) {
-    const Observation& row = source.row(r);
-    result.value(r, 0) = source.converted(r, column);
-    if (std::isnan(result.value(r, 0)))
-      throw InputError::in(row.place, "the response {} is empty", result.response);
-    if (!reduced) continue;
-    const double density = dry_air_density_kg_m3(row.air_pressure_Pa, row.air_temperature_C + kZeroCelsius_K);
-    result.known(r, 0) = density * std::pow(*row.speed_rpm / 60, 2) *
-                         std::pow(row.diameter_m.value_or(1), 4);  // T = C_T ρ n² D⁴
-  }
-}
-
-/// The first row whose response has not the sign of most of its group.
-std::optional<Index> row_of_other_sign(const TableSource& source, const Observations& result) {
-  std::vector<std::string> group;
-  for (Index r = 0; r < source.count(); ++r) group.push_back(source.row(r).group);
-  const auto row =
-      of_other_sign(std::vector<double>(result.value.data(), result.value.data() + source.count()), group);
-  return row ? std::optional<Index>(static_cast<Index>(*row)) : std::nullopt;
-}
-
-/// Groups that pulled the other way are measured by magnitude; a response of both signs is kept as it is.
-/// Thrusts that scatter alike have an offset beside their C_T.
-void set_scale(const TableSource& source, bool alike, Observations& result) {
-  result.multiplicative = !alike && !row_of_other_sign(source, result);
-  if (result.multiplicative) {
-    result.sign = result.value.array().sign();
-    result.value = result.value.cwiseAbs();
-    result.y = (result.value.array() / result.known.array()).log();
-  } else {
-    result.y = result.value;
-    if ((result.known.array() != 1).any()) result.slopes = result.known;
-    result.known.setOnes();
-  }
 }
 
 /// By run_order, where every row has one: steps and what depends on the row before go by place.

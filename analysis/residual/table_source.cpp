@@ -37,6 +37,12 @@ std::vector<std::string> TableSource::texts(const std::string& column) const {
   return result;
 }
 
+TableColumn described(const TableSchema& schema, const std::string& name) {
+  for (const TableColumn& column : schema.covariates)
+    if (column.column == name) return column;
+  return {.column = name, .unit = "1", .meaning = ""};
+}
+
 bool is_own_response(const TableSchema& schema, const ObservationChoice& choice) {
   return choice.response.empty() || choice.response == schema.response.column;
 }

@@ -26,6 +26,9 @@ struct TableSource {
   std::vector<std::string> texts(const std::string& column) const;
 };
 
+/// What the schema says of a column; a pure number where it says nothing.
+TableColumn described(const TableSchema& schema, const std::string& name);
+
 /// Whether the choice is the response that the schema names.
 bool is_own_response(const TableSchema& schema, const ObservationChoice& choice);
 

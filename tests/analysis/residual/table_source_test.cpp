@@ -145,6 +145,22 @@ TEST_F(TableSourceTest, ThrustsOfBothSignsHaveATareBesideTheirC_T) {
               Not(Contains(HasSubstr("a constant beside C_T"))));
 }
 
+/// A tachometer does not see the direction. In reverse the blades give a quarter less.
+TEST_F(TableSourceTest, ThrustsOfBothDirectionsAreOfASpeedWithTheirSign) {
+  std::string csv = "b,N,y\n";
+  for (int r = 0; r < 96; ++r) {
+    const double rpm = 1000 + 6000 * even(random), full_N = 6 * std::pow(rpm / 5000, 2);
+    csv += fmt::format("{},{},{}\n", r / 8, rpm,
+                       (r % 2 == 0 ? full_N : -0.75 * full_N) + 0.02 * scatter(random));
+  }
+  const Explanation e = explained(observed(csv, kThrustAndSpeed));
+  EXPECT_THAT(e.warnings, Contains(HasSubstr("thrusts of both directions")));
+  EXPECT_THAT(e.warnings, Not(Contains(HasSubstr("a tare that was not taken off"))));
+  ASSERT_EQ(names(e), "bidirectional ") << explanation_text(e);
+  EXPECT_NEAR(e.adopted[0].parameters[0].value, -0.25, 0.02);
+  EXPECT_LT(e.after.held_out_rmse, 0.05 * e.before.held_out_rmse);
+}
+
 /// The density that C_T is made with has the pressure; it is not sought again.
 TEST_F(TableSourceTest, RowsWithoutAirHaveNoC_TAndItsPressureIsNotSoughtAgain) {
   std::string csv = "b,N,T,p,y\n";
