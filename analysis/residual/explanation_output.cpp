@@ -197,7 +197,7 @@ std::string explanation_text(const Explanation& e) {
                         a.term.effect->formula, parameters_in_words(a));
     if (!a.confounded_with.empty())
       text += fmt::format("    not to be told from: {}\n", joined(a.confounded_with));
-    if (!a.separating_run && !a.confounded_with.empty())
+    if (!a.separating_run && !a.confounded_with.empty() && !a.term.per_group)
       text += "    no run within reach would tell them apart\n";
     if (a.separating_run) text += fmt::format("    would tell: {}\n", a.separating_run->text);
   }

@@ -110,9 +110,13 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
       scale_of(observations) *
       detectable_by_one(MixedModel(observations, rows, fit.variances.ratio), fit.variances, settings.alpha);
   explanation.verdict = "insufficient";
-  explanation.warnings.push_back(
-      fmt::format("{} blocks are too few to tell an effect from chance; {} are needed", observations.blocks(),
-                  kFewestBlocks));
+  explanation.warnings.push_back(fmt::format(
+      "{} too few to tell an effect from chance; {} are needed{}",
+      observations.blocks() == 1 ? "1 block is" : fmt::format("{} blocks are", observations.blocks()),
+      kFewestBlocks,
+      observations.from_table && observations.rows() >= kFewestBlocks
+          ? " (where rows count as independent: blocks = \"rows\", or bins(column, n))"
+          : ""));
 }
 
 void report_adopted(const Observations& observations, const Attribution& found, const JointFit& whole,
