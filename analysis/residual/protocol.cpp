@@ -46,7 +46,7 @@ bool speak_against(const HeldOutErrors& with, const HeldOutErrors& without) {
   return of_runs.sum() > kClearly * of_runs.norm() && rms(with.error) > rms(with.expected_std);
 }
 
-/// Whether errors are larger than runs of that scatter make them, by their blocks: each counts as one.
+/// Whether errors are far larger than runs of that scatter make them, by their blocks: each counts as one.
 bool is_beyond_floor(const Observations& observations, const ErrorEstimate& estimate, double noise_floor,
                      const std::vector<int>& scored) {
   constexpr double kFarAboveFloor = 1.25, kCertain = 0.99;
@@ -56,7 +56,7 @@ bool is_beyond_floor(const Observations& observations, const ErrorEstimate& esti
   const double blocks = static_cast<double>(ids.size());
   const double ratio = estimate.held_out_rmse / noise_floor;
   return estimate.held_out_low > kFarAboveFloor * noise_floor ||
-         ratio * ratio > chi2_quantile(kCertain, blocks) / blocks;
+         (ratio > kFarAboveFloor && ratio * ratio > chi2_quantile(kCertain, blocks) / blocks);
 }
 
 HeldOutErrors score(const Observations& observations, const JointFit& fit, const NullFit& variances,
