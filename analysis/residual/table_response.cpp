@@ -3,6 +3,7 @@
 #include "analysis/air.h"
 #include "datasets/error.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -63,12 +64,15 @@ double rest_beside(const VectorXd& x, const VectorXd& y) {
 /// group's thrusts follow that.
 void turn_reversed(const VectorXd& thrust_N, Observations& result) {
   constexpr double kClearly = 0.5;
+  constexpr Index kOneOf = 10;  // fewer are errors
   std::map<int, std::vector<Index>> groups;
   for (Index r = 0; r < thrust_N.size(); ++r) groups[result.group[static_cast<std::size_t>(r)]].push_back(r);
   std::vector<std::string> reversed;
   for (const auto& [group, rows] : groups) {
     const VectorXd y = thrust_N(rows), known = result.known(rows, 0);
     const VectorXd directed = known.array() * y.array().sign();
+    const Index forward = (y.array() > 0).count();
+    if (kOneOf * std::min(forward, y.size() - forward) < y.size()) continue;
     if (!(rest_beside(directed, y) < kClearly * rest_beside(known, y))) continue;
     result.known(rows, 0) = directed;
     reversed.push_back(result.group_name[static_cast<std::size_t>(group)]);
