@@ -128,9 +128,9 @@ struct IsolatedValue {
 };
 std::vector<IsolatedValue> isolated_values(const Observations& observations);
 
-/// Of a campaign: those whose runs are to be set aside at once. A value five ranges away would be the whole
-/// of what goes with its condition; one a range away, of a run that is far off its location on all rotors
-/// alike, is what made it so (the air's density).
+/// Of a campaign: those whose runs are to be set aside at once. A condition five ranges away whose run gave
+/// an ordinary thrust on the mean of its rotors (a run at another speed, on purpose, does not); and an air
+/// temperature one range away whose run is far off, which the density made of it.
 std::vector<IsolatedValue> mistyped_values(const Observations& observations);
 
 }  // namespace tunnelrig

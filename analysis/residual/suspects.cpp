@@ -240,15 +240,16 @@ std::vector<IsolatedValue> isolated_values(const Observations& observations) {
 
 std::vector<IsolatedValue> mistyped_values(const Observations& observations) {
   constexpr double kARangeAway = 1, kFarOff = 10;
-  std::vector<IsolatedValue> result = isolated_values(observations);
   const VectorXd away = common_distance(observations);
-  for (const IsolatedValue& value : values_beyond(observations, kARangeAway)) {
+  const auto is_far_off = [&](const IsolatedValue& value) {
     const auto run = std::find(observations.name.begin(), observations.name.end(), value.row);
-    const bool known = std::any_of(result.begin(), result.end(), [&](const IsolatedValue& other) {
-      return other.row == value.row && other.covariate == value.covariate;
-    });
-    if (!known && std::abs(away(run - observations.name.begin())) > kFarOff) result.push_back(value);
-  }
+    return std::abs(away(run - observations.name.begin())) > kFarOff;
+  };
+  std::vector<IsolatedValue> result;
+  for (const IsolatedValue& value : isolated_values(observations))
+    if (!is_far_off(value)) result.push_back(value);
+  for (const IsolatedValue& value : values_beyond(observations, kARangeAway))
+    if (value.covariate == "air_temperature_C" && is_far_off(value)) result.push_back(value);
   return result;
 }
 

@@ -45,14 +45,24 @@ TEST_F(Mistyped, AConditionIsSetAsideAndHidesNothing) {
               Contains(HasSubstr("supply_voltage_V of " + campaign.name[70] + " is 1.6, far from")));
 }
 
-TEST_F(Mistyped, AModestSlipIsOneOnlyWhereTheThrustIsFarOff) {
-  volts(70) = 18.5;  // of 15 to 17
-  EXPECT_TRUE(mistyped_values(campaign).empty()) << "a run under another supply";
+TEST_F(Mistyped, ATemperatureIsASlipWhereTheDensityPutTheThrustFarOff) {
+  test::add_covariate(campaign, "air_temperature_C", 18, 24, random);
+  campaign.covariates.back().value(70, 0) = 4;
+  EXPECT_TRUE(mistyped_values(campaign).empty()) << "a cold day";
   Eigen::MatrixXd y = campaign.y;
-  y.row(70).array() += 0.1;
+  y.row(70).array() += 0.06;
   test::set_y(campaign, y);
   ASSERT_EQ(mistyped_values(campaign).size(), 1u);
   EXPECT_EQ(mistyped_values(campaign)[0].row, campaign.name[70]);
+}
+
+/// The run that would tell two effects apart, as `separating_run` proposes it.
+TEST_F(Mistyped, ARunUnderOtherConditionsOnPurposeIsNone) {
+  volts(70) = 24;
+  Eigen::MatrixXd y = campaign.y;
+  y.row(70).array() += 0.08;
+  test::set_y(campaign, y);
+  EXPECT_TRUE(mistyped_values(campaign).empty());
 }
 
 TEST_F(Mistyped, GapsOfADistanceAreNoValues) {
