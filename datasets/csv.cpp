@@ -200,12 +200,11 @@ void join_free_text(std::vector<std::string>& cells, const std::vector<std::stri
   const bool last =
       column != columns.end() &&
       std::all_of(column + 1, columns.end(), [](const std::string& name) { return name.empty(); });
-  if (!last) return;
+  if (!last || cells.size() <= columns.size()) return;
   const auto at = cells.begin() + (column - columns.begin());
-  while (cells.size() > columns.size()) {
-    *at += "," + *(at + 1);
-    cells.erase(at + 1);
-  }
+  const auto end = at + 1 + static_cast<std::ptrdiff_t>(cells.size() - columns.size());
+  for (auto part = at + 1; part != end; ++part) *at += "," + *part;
+  cells.erase(at + 1, end);
 }
 
 }  // namespace
