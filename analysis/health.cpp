@@ -1,6 +1,7 @@
 #include "analysis/health.h"
 
 #include "datasets/error.h"
+#include "datasets/first_few.h"
 
 #include <algorithm>
 #include <cmath>
@@ -22,13 +23,7 @@ class Names {
   void add(const std::string& name) { names_.push_back(name); }
   bool empty() const { return names_.empty(); }
   std::size_t size() const { return names_.size(); }
-  std::string text() const {
-    const std::size_t shown = std::min(kNamedRuns, names_.size());
-    std::string text = fmt::format(
-        "{}", fmt::join(names_.begin(), names_.begin() + static_cast<std::ptrdiff_t>(shown), ", "));
-    if (names_.size() > shown) text += fmt::format(" and {} more", names_.size() - shown);
-    return text;
-  }
+  std::string text() const { return first_few(names_, kNamedRuns); }
 
  private:
   std::vector<std::string> names_;

@@ -2,6 +2,7 @@
 #include "analysis/residual/explanation_parts.h"
 #include "calibration/distributions.h"
 #include "datasets/error.h"
+#include "datasets/first_few.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +10,6 @@
 #include <set>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 namespace tunnelrig {
 namespace {
@@ -160,9 +160,7 @@ void number_change_points(const Observations& observations, const std::vector<Ch
 
 std::string only_sealed_in_words(const std::vector<std::string>& groups) {
   constexpr std::size_t kNamed = 5;
-  const auto end = groups.begin() + static_cast<std::ptrdiff_t>(std::min(groups.size(), kNamed));
-  return fmt::format("runs in sealed blocks only, so not scored: {}{}", fmt::join(groups.begin(), end, ", "),
-                     groups.size() > kNamed ? fmt::format(" and {} more", groups.size() - kNamed) : "");
+  return "runs in sealed blocks only, so not scored: " + first_few(groups, kNamed);
 }
 
 /// What every explanation says first.
@@ -240,7 +238,9 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
         "hold out others");
   set_interval(alone, before, settings.seed, explanation.before);
   set_interval(alone, after, settings.seed, explanation.after);
-  const HeldOutErrors whole = score(wide, found.final, found.final.variances, seal.open, scored);
+  const bool all_shown = settings.empirical || found.curves.empty();
+  const HeldOutErrors whole =
+      all_shown ? after : score(wide, found.final, found.final.variances, seal.open, scored);
   HeldOutErrors curves = before;
   if (!found.curves.empty()) {
     const JointFit fit = fit_jointly(alone, {.terms = {}, .curves = found.final.model.curves}, seal.open);
@@ -252,8 +252,8 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
                         .against_names = speak_against(whole, curves),
                         .against_adopted = speak_against(after, before)};
   explanation.noise_floor = rms(whole.expected_std);
-  ErrorEstimate all;  // with the curves, whose structure is said
-  set_interval(alone, whole, settings.seed, all);
+  ErrorEstimate all = explanation.after;
+  if (!all_shown) set_interval(alone, whole, settings.seed, all);  // with the curves, whose structure is said
   explanation.sealed.beyond_floor = is_beyond_floor(alone, all, explanation.noise_floor, scored);
   explanation.before.rmse = rms(residuals(alone, found.baseline, seal.open));
   explanation.after.rmse = rms(residuals(wide, shown, seal.open));

@@ -1,6 +1,7 @@
 #include "analysis/residual/table_source.h"
 
 #include "analysis/resting_speed.h"
+#include "datasets/first_few.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +10,6 @@
 #include <numeric>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 namespace tunnelrig {
 
@@ -64,12 +64,7 @@ std::optional<std::size_t> of_other_sign(const std::vector<double>& values,
 
 namespace {
 
-/// Their places, as many as anybody reads.
-std::string first_few(const std::vector<std::string>& rows) {
-  constexpr std::size_t kNamed = 4;
-  const auto end = rows.begin() + static_cast<std::ptrdiff_t>(std::min(rows.size(), kNamed));
-  return fmt::format(", {}{}", fmt::join(rows.begin(), end, ", "), rows.size() > kNamed ? " …" : "");
-}
+constexpr std::size_t kNamedRows = 4;
 
 bool is_thrust_with_speed(const ObservationTable& table, const ObservationChoice& choice) {
   return is_own_response(table.schema, choice) && table.schema.response.meaning == "thrust_N" &&
@@ -103,8 +98,8 @@ void leave_out(TableSource& source, const char* why, Observations& result, const
     return goes;
   });
   if (out.empty()) return;
-  result.left_out.push_back(
-      fmt::format("{} {}: {}{}", out.size(), out.size() == 1 ? "row" : "rows", why, first_few(out)));
+  result.left_out.push_back(fmt::format("{} {}: {}, {}", out.size(), out.size() == 1 ? "row" : "rows", why,
+                                        first_few(out, kNamedRows)));
 }
 
 /// A speed that a few rows lack would be no condition at all.
@@ -128,8 +123,8 @@ void say_duplicates(const TableSource& source, Observations& result) {
   if (again.empty() || again.size() * kOneOf < source.rows.size()) return;
   result.left_out.push_back(fmt::format(
       "{} {} the same in every column as another, and count as measured anew: if they were entered "
-      "twice, every p is too small{}",
-      again.size(), again.size() == 1 ? "row is" : "rows are", first_few(again)));
+      "twice, every p is too small, {}",
+      again.size(), again.size() == 1 ? "row is" : "rows are", first_few(again, kNamedRows)));
 }
 
 }  // namespace
@@ -144,19 +139,18 @@ TableSource used_rows(const ObservationTable& table, const ObservationChoice& ch
               return row.speed_rpm && rest_rpm > 0 && *row.speed_rpm <= rest_rpm;
             });
   const bool diameter = table.schema.diameter_column || table.schema.diameter_m;
-  source.as_c_t =
-      is_thrust_with_speed(table, choice) && (diameter || have_a_tare(table, choice, source.rows));
-  if (!source.as_c_t) {
-    if (is_thrust_with_speed(table, choice)) leave_out_few_without_speed(source, result);
-    say_duplicates(source, result);
-    return source;
+  const bool thrust_with_speed = is_thrust_with_speed(table, choice);
+  source.as_c_t = thrust_with_speed && (diameter || have_a_tare(table, choice, source.rows));
+  if (source.as_c_t) {
+    leave_out(source, "no speed was read, so there is no C_T", result,
+              [&](const Observation& row) { return !row.speed_rpm || at_rest.at(row.group) == 0; });
+    leave_out(source, "the temperature or the pressure of the air is empty, so there is no C_T", result,
+              [](const Observation& row) {
+                return std::isnan(row.air_temperature_C) || std::isnan(row.air_pressure_Pa);
+              });
+  } else if (thrust_with_speed) {
+    leave_out_few_without_speed(source, result);
   }
-  leave_out(source, "no speed was read, so there is no C_T", result,
-            [&](const Observation& row) { return !row.speed_rpm || at_rest.at(row.group) == 0; });
-  leave_out(source, "the temperature or the pressure of the air is empty, so there is no C_T", result,
-            [](const Observation& row) {
-              return std::isnan(row.air_temperature_C) || std::isnan(row.air_pressure_Pa);
-            });
   say_duplicates(source, result);
   return source;
 }

@@ -66,7 +66,7 @@ TEST_F(TableSourceTest, RowsWithoutASpeedHaveNoC_TAndAreSaid) {
   EXPECT_THAT(o.left_out, ElementsAre("1 row: the motor stood or its speed was not read (at most 5 % of what "
                                       "its group runs at), t.csv:108",
                                       "10 rows: no speed was read, so there is no C_T, t.csv:98, t.csv:99, "
-                                      "t.csv:100, t.csv:101 …"));
+                                      "t.csv:100, t.csv:101 and 6 more"));
   EXPECT_EQ(observed(csv, schema).rows(), 105)
       << "a day without speeds has its thrusts; one empty cell is left out";
 }
