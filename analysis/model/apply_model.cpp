@@ -47,6 +47,8 @@ class Forward {
     }
     predict_forces();
   }
+  Forward(const Forward&) = delete;  // the run before is of this one's predicted forces
+  Forward& operator=(const Forward&) = delete;
 
   /// The covariate that the run lacks; empty where it has all.
   std::string lacks(Index row) const {

@@ -228,10 +228,7 @@ double share_beside_cubics(const Observations& observations, const std::vector<i
     for (int power = 1; power <= kDegree; ++power) columns.col(next++) = (x / x.abs().maxCoeff()).pow(power);
   }
   columns.col(next) = column;
-  std::map<int, std::vector<Index>> groups;
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    groups[observations.group[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
-  for (const auto& [group, members] : groups) {
+  for (const auto& [group, members] : places_of_each(observations.group, rows)) {
     const MatrixXd own = columns(members, Eigen::all);
     columns(members, Eigen::all) = own.rowwise() - own.colwise().mean();
   }

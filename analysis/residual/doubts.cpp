@@ -2,14 +2,13 @@
 // rows that are alike.
 #include "analysis/residual/explanation_parts.h"
 #include "analysis/residual/run_correlation.h"
+#include "datasets/first_few.h"
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 namespace tunnelrig {
 
@@ -125,10 +124,6 @@ void warn_of_shared_conditions(const Observations& observations, Explanation& ex
           name));
 }
 
-}  // namespace
-
-namespace {
-
 /// Correlation of two columns beside the baseline; of one rotor, or of all.
 double correlation_beside(const MixedModel& baseline, const Components& a, const Components& b) {
   double ab = 0, aa = 0, bb = 0;
@@ -195,10 +190,8 @@ void warn_of_tares(const Observations& observations, const MeanModel& model, Exp
   const std::vector<int> all = observations.all_rows();
   const Forces forces = predict_forces(observations, model, all);
   const VectorXd thrust_N = (observations.y - linearise(observations, model, forces).offset[0]).col(0);
-  std::map<int, std::vector<int>> rows_of;
-  for (const int row : all) rows_of[observations.group[static_cast<std::size_t>(row)]].push_back(row);
   std::vector<std::string> tares;
-  for (const auto& [group, rows] : rows_of) {
+  for (const auto& [group, rows] : rows_of_each(observations.group, all)) {
     if (rows.size() < kFewest) continue;
     const Tare tare = tare_of(observations, thrust_N, rows);
     if (std::abs(tare.value_N) <= kClear * tare.standard_error_N) continue;
@@ -207,11 +200,9 @@ void warn_of_tares(const Observations& observations, const MeanModel& model, Exp
                                 tare.value_N, tare.standard_error_N, observations.unit));
   }
   if (tares.empty()) return;
-  const auto end = tares.begin() + static_cast<std::ptrdiff_t>(std::min(tares.size(), kNamed));
   explanation.warnings.push_back(
-      fmt::format("the baseline has a constant beside C_T, {}{}: a tare that was not taken off?",
-                  fmt::join(tares.begin(), end, ", "),
-                  tares.size() > kNamed ? fmt::format(" and {} more", tares.size() - kNamed) : ""));
+      fmt::format("the baseline has a constant beside C_T, {}: a tare that was not taken off?",
+                  first_few(tares, kNamed)));
 }
 
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation) {

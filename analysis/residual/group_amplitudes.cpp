@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 namespace tunnelrig {
 
@@ -15,16 +14,6 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kLeastSeen = 1e-6;  // of a column: below it what is left is rounding
-
-/// Places in `rows` of each block's, in their order.
-std::vector<std::vector<Index>> blocks_of(const Observations& observations, const std::vector<int>& rows) {
-  std::map<int, std::vector<Index>> blocks;
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    blocks[observations.block[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
-  std::vector<std::vector<Index>> result;
-  for (auto& [block, own] : blocks) result.push_back(std::move(own));
-  return result;
-}
 
 }  // namespace
 
@@ -38,17 +27,15 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
   // Effects of each group's own are the last of the baseline's slopes, in their order.
   const Index column = observations.slopes.cols() - own_amplitudes(model.terms.size()) + own_amplitudes(t);
   const Components offset = linearise(observations, model, predict_forces(observations, model, rows)).offset;
-  std::map<int, std::vector<int>> groups;
-  for (const int row : rows) groups[observations.group[static_cast<std::size_t>(row)]].push_back(row);
   std::vector<GroupEstimate> result;
-  for (const auto& [group, own] : groups) {
+  for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
     const Index n = static_cast<Index>(own.size()), k = observations.slopes.cols();
     MatrixXd items(n, k + 2);  // constant and other columns, then x and y
     items << VectorXd::Ones(n), observations.slopes(own, Eigen::all),
         observations.y(own, 0) - offset[0](own, 0);
     items.col(1 + column).swap(items.col(k));
-    whiten(blocks_of(observations, own), observations.scatter.of_runs(own), kRatios[variances.ratio[0]], 0,
-           items);
+    whiten(without_numbers(places_of_each(observations.block, own)), observations.scatter.of_runs(own),
+           kRatios[variances.ratio[0]], 0, items);
     // What the group's other columns make of both is no part of the amplitude (Frisch & Waugh 1933).
     const MatrixXd others = items.leftCols(k);
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(others);

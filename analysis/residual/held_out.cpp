@@ -52,11 +52,8 @@ Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vect
 /// model has no such group: `plain` is the same without any baseline. `scatter`: of each run.
 void own_baseline(const Observations& observations, const std::vector<int>& rows, const VectorXd& scatter,
                   const MatrixXd& plain, double sigma2, MatrixXd& residual, MatrixXd& variance) {
-  std::map<int, std::vector<Index>> runs;
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    if (std::isnan(residual(static_cast<Index>(r), 0)))
-      runs[observations.group[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
-  for (const auto& [group, members] : runs) {
+  for (auto& [group, members] : places_of_each(observations.group, rows)) {
+    std::erase_if(members, [&](Index r) { return !std::isnan(residual(r, 0)); });
     std::vector<Index> fitted, scored;
     for (std::size_t m = 0; m < members.size(); ++m) (m % 2 == 0 ? fitted : scored).push_back(members[m]);
     const auto design = [&](const std::vector<Index>& of) {
@@ -82,12 +79,10 @@ void own_baseline(const Observations& observations, const std::vector<int>& rows
 VectorXd whitened(const Observations& observations, const std::vector<int>& rows, const MatrixXd& error,
                   const VectorXd& scatter, double sigma, double ratio, double run_correlation) {
   MatrixXd result = error.array().isNaN().select(0, error);
-  std::map<int, std::vector<Index>> of_block;
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    if (!std::isnan(error(static_cast<Index>(r), 0)))
-      of_block[observations.block[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Index>(r));
-  std::vector<std::vector<Index>> blocks;
-  for (auto& [block, runs] : of_block) blocks.push_back(std::move(runs));
+  auto blocks = without_numbers(places_of_each(observations.block, rows));
+  for (std::vector<Index>& runs : blocks)
+    std::erase_if(runs, [&](Index r) { return std::isnan(error(r, 0)); });
+  std::erase_if(blocks, [](const std::vector<Index>& runs) { return runs.empty(); });
   whiten(blocks, scatter, ratio, run_correlation, result);
   return result.reshaped() / std::max(sigma, 1e-150);
 }

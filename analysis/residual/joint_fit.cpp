@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <memory>
 
 #include <ceres/ceres.h>
@@ -196,18 +195,15 @@ MatrixXd along_slopes(const Observations& observations, const MatrixXd& residual
                       const std::vector<int>& rows) {
   MatrixXd result = MatrixXd::Zero(residual.rows(), residual.cols());
   if (observations.slopes.cols() == 0) return result;
-  std::map<int, std::vector<int>> fitted, all;
-  for (const int row : rows) fitted[observations.group[static_cast<std::size_t>(row)]].push_back(row);
-  for (int row = 0; row < static_cast<int>(residual.rows()); ++row)
-    all[observations.group[static_cast<std::size_t>(row)]].push_back(row);
-  for (const auto& [group, own] : fitted) {
+  const auto all = places_of_each(observations.group);
+  for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
     const MatrixXd x = observations.slopes(own, Eigen::all), y = residual(own, Eigen::all);
     const Eigen::RowVectorXd middle = x.colwise().mean();
     const MatrixXd slope = (x.rowwise() - middle)
                                .completeOrthogonalDecomposition()
                                .solve(MatrixXd(y.rowwise() - y.colwise().mean()));
     const Eigen::RowVectorXd from = observations.is_line() ? Eigen::RowVectorXd::Zero(x.cols()) : middle;
-    for (const int row : all.at(group)) result.row(row) = (observations.slopes.row(row) - from) * slope;
+    for (const Index row : all.at(group)) result.row(row) = (observations.slopes.row(row) - from) * slope;
   }
   return result;
 }

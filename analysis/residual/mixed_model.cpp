@@ -135,12 +135,8 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
     if (observations.channels() > 1)
       strata_.push_back({component, 1, static_cast<int>(observations.channels()) - 1});
   }
-  std::map<int, std::vector<Index>> blocks;
-  for (std::size_t r = 0; r < rows_.size(); ++r) {
-    blocks[observations.block[static_cast<std::size_t>(rows_[r])]].push_back(static_cast<Index>(r));
-  }
   if (observations.blocks_are_rows) ratios_ = 1;
-  for (auto& [block, runs] : blocks) blocks_.push_back(std::move(runs));
+  blocks_ = without_numbers(places_of_each(observations.block, rows_));
   set_groups();
   const bool alike = observations.channels() == 1 || run_correlation_[0] == run_correlation_[1];
   std::set<std::size_t> wanted(ratio.begin(), ratio.end());
@@ -160,11 +156,8 @@ const MixedModel::Prepared& MixedModel::prepared(std::size_t stratum, std::size_
 }
 
 void MixedModel::set_groups() {
-  std::map<int, std::vector<int>> rows_of_group;
-  for (const int row : rows_)
-    rows_of_group[observations_.group[static_cast<std::size_t>(row)]].push_back(row);
   const Index each = 1 + observations_.slopes.cols();
-  for (const auto& [number, rows] : rows_of_group) {
+  for (const auto& [number, rows] : rows_of_each(observations_.group, rows_)) {
     MatrixXd columns(static_cast<Index>(rows.size()), each);
     columns << Eigen::VectorXd::Ones(columns.rows()), observations_.slopes(rows, Eigen::all);
     const Eigen::ColPivHouseholderQR<MatrixXd> qr(columns);

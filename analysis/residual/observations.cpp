@@ -15,6 +15,32 @@ std::vector<T> picked(const std::vector<T>& from, const std::vector<int>& rows) 
 
 }  // namespace
 
+std::map<int, std::vector<Eigen::Index>> places_of_each(const std::vector<int>& number,
+                                                        const std::vector<int>& rows) {
+  std::map<int, std::vector<Eigen::Index>> places;
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    places[number[static_cast<std::size_t>(rows[r])]].push_back(static_cast<Eigen::Index>(r));
+  return places;
+}
+
+std::map<int, std::vector<Eigen::Index>> places_of_each(const std::vector<int>& number) {
+  std::map<int, std::vector<Eigen::Index>> places;
+  for (std::size_t r = 0; r < number.size(); ++r) places[number[r]].push_back(static_cast<Eigen::Index>(r));
+  return places;
+}
+
+std::map<int, std::vector<int>> rows_of_each(const std::vector<int>& number, const std::vector<int>& rows) {
+  std::map<int, std::vector<int>> result;
+  for (const int row : rows) result[number[static_cast<std::size_t>(row)]].push_back(row);
+  return result;
+}
+
+std::vector<std::vector<Eigen::Index>> without_numbers(std::map<int, std::vector<Eigen::Index>> places) {
+  std::vector<std::vector<Eigen::Index>> result;
+  for (auto& [number, own] : places) result.push_back(std::move(own));
+  return result;
+}
+
 Covariate covariate_of_texts(const std::string& name, const std::vector<std::string>& texts) {
   const std::set<std::string> different(texts.begin(), texts.end());
   Covariate covariate{name, Eigen::MatrixXd(static_cast<Eigen::Index>(texts.size()), 1)};

@@ -37,6 +37,19 @@ inline bool may_be_absent(std::string_view covariate) {
   return covariate == kGroundDistance || covariate == kCeilingDistance;
 }
 
+/// The places in `rows` of each group or block, by its number; `number` is of all rows.
+std::map<int, std::vector<Eigen::Index>> places_of_each(const std::vector<int>& number,
+                                                        const std::vector<int>& rows);
+
+/// Of all rows.
+std::map<int, std::vector<Eigen::Index>> places_of_each(const std::vector<int>& number);
+
+/// The rows themselves.
+std::map<int, std::vector<int>> rows_of_each(const std::vector<int>& number, const std::vector<int>& rows);
+
+/// Places in the order of their numbers.
+std::vector<std::vector<Eigen::Index>> without_numbers(std::map<int, std::vector<Eigen::Index>> places);
+
 /// A column of texts; an empty cell is a text as well.
 Covariate covariate_of_texts(const std::string& name, const std::vector<std::string>& texts);
 

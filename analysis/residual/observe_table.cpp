@@ -118,10 +118,8 @@ void set_belonging(const TableSource& source, Observations& result) {
 
 /// Place of a row's value within its group, 0 to 1.
 VectorXd ranks(const TableSource& source, const Observations& result, const std::string& column) {
-  std::map<int, std::vector<Index>> groups;
-  for (Index r = 0; r < source.count(); ++r) groups[result.group[static_cast<std::size_t>(r)]].push_back(r);
   VectorXd rank(source.count());
-  for (auto& [group, rows] : groups) {
+  for (auto& [group, rows] : places_of_each(result.group)) {
     std::stable_sort(rows.begin(), rows.end(),
                      [&](Index a, Index b) { return source.cell(a, column) < source.cell(b, column); });
     for (std::size_t k = 0; k < rows.size(); ++k)

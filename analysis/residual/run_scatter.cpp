@@ -58,16 +58,12 @@ VectorXd scatter_of(const Compared& compared) {
 /// Multiplies the scatter of all runs that belong together by what those of the model show.
 void let_differ(const std::vector<int>& number, const std::vector<int>& rows, const MatrixXd& size,
                 const MatrixXd& alike, VectorXd& scatter) {
-  std::map<int, std::vector<Index>> by_number;
-  for (std::size_t k = 0; k < rows.size(); ++k)
-    by_number[number[static_cast<std::size_t>(rows[k])]].push_back(static_cast<Index>(k));
+  std::map<int, std::vector<Index>> by_number = places_of_each(number, rows);
   // Nothing is left of the only run at a location, nor of a session of such.
   std::erase_if(by_number,
                 [&](const auto& set) { return alike(set.second, Eigen::all).mean() < kLeastLeftOfMean; });
   if (by_number.size() < kFewestToCompare) return;
-  std::vector<std::vector<Index>> sets;
-  for (const auto& [of, runs] : by_number) sets.push_back(runs);
-  const VectorXd times = scatter_of(compare(size, alike, sets));
+  const VectorXd times = scatter_of(compare(size, alike, without_numbers(by_number)));
   for (Index row = 0; row < scatter.size(); ++row) {
     const auto set = by_number.find(number[static_cast<std::size_t>(row)]);
     if (set != by_number.end()) scatter(row) *= times(std::distance(by_number.begin(), set));

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <map>
 #include <numeric>
 
 namespace tunnelrig {
@@ -58,12 +57,10 @@ VectorXd distance_of_those_apart(const Observations& observations, const std::ve
                                  const VectorXd& residual) {
   constexpr double kFar = 10, kGap = 2;
   constexpr std::size_t kFewestOfGroup = 5;
-  std::map<int, std::vector<Index>> groups;
-  for (Index r = 0; r < residual.size(); ++r)
-    if (std::isfinite(residual(r)))
-      groups[observations.group[static_cast<std::size_t>(rows[static_cast<std::size_t>(r)])]].push_back(r);
   VectorXd away = VectorXd::Zero(residual.size());
-  for (const auto& [group, members] : groups) {
+  for (auto& [group, members] : places_of_each(observations.group, rows)) {
+    std::erase_if(members, [&](Index r) { return !std::isfinite(residual(r)); });
+    if (members.empty()) continue;
     const VectorXd own = residual(members);
     away(members) =
         own.array() - (members.size() < kFewestOfGroup ? 0 : upper_median({own.begin(), own.end()}));
@@ -147,11 +144,8 @@ std::vector<SuspectRow> wild_runs(const Observations& observations) {
   constexpr double kWild = 30;
   constexpr std::size_t kFewest = 3;  // of two runs or rotors, nothing says which is wrong
   if (static_cast<std::size_t>(observations.channels()) < kFewest) return {};
-  std::map<int, std::vector<Index>> runs_of_group;
-  for (Index r = 0; r < observations.rows(); ++r)
-    runs_of_group[observations.group[static_cast<std::size_t>(r)]].push_back(r);
   MatrixXd away = observations.y;
-  for (const auto& [group, runs] : runs_of_group)
+  for (const auto& [group, runs] : places_of_each(observations.group))
     for (Index c = 0; c < away.cols(); ++c) {
       const VectorXd y = observations.y(runs, c);
       away(runs, c).array() -= upper_median({y.begin(), y.end()});
@@ -219,12 +213,9 @@ std::vector<IsolatedValue> values_beyond(const Observations& observations, doubl
 
 /// Of each run, what all rotors have in common beside its location's median, in σ by the median of all.
 VectorXd common_distance(const Observations& observations) {
-  std::map<int, std::vector<Index>> runs_of_group;
-  for (Index r = 0; r < observations.rows(); ++r)
-    runs_of_group[observations.group[static_cast<std::size_t>(r)]].push_back(r);
   const VectorXd common = observations.y.rowwise().mean();
   VectorXd away = common;
-  for (const auto& [group, runs] : runs_of_group) {
+  for (const auto& [group, runs] : places_of_each(observations.group)) {
     const VectorXd own = common(runs);
     away(runs).array() -= upper_median({own.begin(), own.end()});
   }

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -65,10 +64,8 @@ double rest_beside(const VectorXd& x, const VectorXd& y) {
 void turn_reversed(const VectorXd& thrust_N, Observations& result) {
   constexpr double kClearly = 0.5;
   constexpr Index kOneOf = 10;  // fewer are errors
-  std::map<int, std::vector<Index>> groups;
-  for (Index r = 0; r < thrust_N.size(); ++r) groups[result.group[static_cast<std::size_t>(r)]].push_back(r);
   std::vector<std::string> reversed;
-  for (const auto& [group, rows] : groups) {
+  for (const auto& [group, rows] : places_of_each(result.group)) {
     const VectorXd y = thrust_N(rows), known = result.known(rows, 0);
     const VectorXd directed = known.array() * y.array().sign();
     const Index forward = (y.array() > 0).count();
