@@ -13,10 +13,10 @@ std::string Effect::cause() const {
   return name == "crosstalk" && !form.empty() ? name + " (" + form + ")" : name;
 }
 
-bool Effect::has_change_point() const {
-  return std::any_of(parameters.begin(), parameters.end(), [](const EffectParameter& parameter) {
-    return parameter.role == ParameterRole::kChangePoint;
-  });
+std::optional<std::size_t> Effect::change_point() const {
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    if (parameters[k].role == ParameterRole::kChangePoint) return k;
+  return {};
 }
 
 std::vector<double> time_constants_s() {

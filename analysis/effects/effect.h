@@ -69,8 +69,9 @@ struct Effect {
   std::function<double(const Sample&, const double*, double)> force_N;
   std::function<EffectJet(const Sample&, const EffectJet*, const EffectJet&)> jet_N;
 
-  bool within_time() const;       // changes within a run
-  bool has_change_point() const;  // begins at some run
+  bool within_time() const;                         // changes within a run
+  std::optional<std::size_t> change_point() const;  // the parameter that says at which run it begins
+  bool has_change_point() const { return change_point().has_value(); }
   /// What it says the cause is: its name, whatever its form; of a table's other axes the axis as well.
   std::string cause() const;
   std::optional<double> theory() const { return parameters[0].theory; }

@@ -64,10 +64,9 @@ struct ChangePoint {
   double low, high;  // 95 %
 };
 
-/// A step was sought among the open blocks: which of the runs of those on either side, and of the sealed ones
-/// between them, lie behind it, all runs tell.
+/// Steps were sought by the open blocks; all runs tell where they lie.
 MeanModel with_change_points_of_all(const Observations& observations, MeanModel model,
-                                    const std::vector<int>& open, std::vector<ChangePoint>& result);
+                                    std::vector<ChangePoint>& result);
 
 /// Sealed runs between the open ones on either side of a step, before or behind it: the open ones do not say
 /// which, so no model could predict them. Nothing where all are.

@@ -259,13 +259,12 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
   explanation.after.rmse = rms(residuals(wide, shown, seal.open));
 }
 
-void estimate_on_all(const Models& models, const Seal& seal, const Observations& observations,
-                     Explanation& explanation) {
+void estimate_on_all(const Models& models, const Observations& observations, Explanation& explanation) {
   const auto& [wide, alone, found] = models;
   const std::vector<int> rows = observations.all_rows();
   std::vector<ChangePoint> change_points;
   const JointFit whole =
-      fit_jointly(wide, with_change_points_of_all(wide, found.final.model, seal.open, change_points), rows);
+      fit_jointly(wide, with_change_points_of_all(wide, found.final.model, change_points), rows);
   const JointFit whole_baseline = fit_jointly(alone, {}, rows);
   explanation.model = whole.model;
   explanation.scatter = wide.scatter;
@@ -318,7 +317,7 @@ Explanation explain_once(const Observations& observations, const std::vector<con
   const Models models{found.observations, alone, found};
   open_seal(models, seal, settings, explanation);
   settings.progress("estimating parameters");
-  estimate_on_all(models, seal, observations, explanation);
+  estimate_on_all(models, observations, explanation);
   warn_of_companions(found.observations, effects, explanation);
   explanation.verdict = verdict_of(explanation);
   return explanation;

@@ -91,8 +91,7 @@ class Search {
   /// The effect of the same condition and rotors that the fit's newest term takes back, or curves that do:
   /// such a sum is a shape and no two causes.
   std::optional<std::string> cancelled_by(const JointFit& fit) const;
-  /// Of a term that is a step, counted from the newest (1): from the run on, of the sessions on either side,
-  /// where it is likeliest.
+  /// Of a term that is a step, counted from the newest (1): from the run on where it is likeliest.
   JointFit at_best_run(JointFit fit, std::size_t from_newest) const;
   // several of which none can be seen alone: search_several.cpp
   static void add_together(Scan& scan, const std::vector<std::size_t>& ways, double weight);

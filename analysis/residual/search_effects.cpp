@@ -1,6 +1,7 @@
 // Named effects: ranked, tried, accepted one by one.
 #include "analysis/residual/null_maxima.h"
 #include "analysis/residual/search.h"
+#include "analysis/residual/step_profile.h"
 #include "calibration/distributions.h"
 
 #include <algorithm>
@@ -59,16 +60,11 @@ bool Search::already_in(const Term& way, const MeanModel& model) {
 
 bool Search::is_beside_a_step(const Term& way, const MeanModel& model) const {
   if (!way.effect->has_change_point()) return false;
-  const auto first_run = [](const Term& term) {
-    std::size_t k = 1;
-    while (term.effect->parameters[k].role != ParameterRole::kChangePoint) ++k;
-    return static_cast<int>(term.parameters[k]);
-  };
-  const int at = first_run(way);
+  const int at = first_row_of(way);
   return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
     if (!term.effect->has_change_point() || (way.rotor >= 0 && term.rotor >= 0 && way.rotor != term.rotor))
       return false;
-    const int other = first_run(term);
+    const int other = first_row_of(term);
     std::set<int> between;
     for (const int row : rows_)
       if (row >= std::min(at, other) && row < std::max(at, other))

@@ -1,5 +1,6 @@
 // What a candidate beyond chance must not be, to get its name.
 #include "analysis/residual/search.h"
+#include "analysis/residual/step_profile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -66,8 +67,7 @@ bool Search::is_gradual(const std::vector<Term>& steps, const NullFit& variances
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
   std::vector<Components> always;  // of each step, as if it had been from the first run on
   for (Term step : steps) {
-    for (std::size_t k = 0; k < step.parameters.size(); ++k)
-      if (step.effect->parameters[k].role == ParameterRole::kChangePoint) step.parameters[k] = 0;
+    step.parameters[step.effect->change_point().value()] = 0;
     always.push_back(respond(step, observations_, predicted).derivative[0]);
   }
   std::vector<Components> columns = fit_.linear.columns;
@@ -87,25 +87,15 @@ bool Search::is_gradual(const std::vector<Term>& steps, const NullFit& variances
 }
 
 JointFit Search::at_best_run(JointFit fit, std::size_t from_newest) const {
-  if (!observations_.blocks_follow_each_other()) return fit;
   const std::size_t t = fit.model.terms.size() - from_newest;
-  const auto& parameters = fit.model.terms[t].effect->parameters;
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    if (parameters[k].role != ParameterRole::kChangePoint) continue;
-    const auto found =
-        std::lower_bound(rows_.begin(), rows_.end(), static_cast<int>(fit.model.terms[t].parameters[k]));
-    if (found == rows_.begin() || found == rows_.end()) continue;
-    const auto block = [&](int row) { return observations_.block[static_cast<std::size_t>(row)]; };
-    const int before = block(*std::prev(found)), behind = block(*found);
-    for (const int row : rows_) {
-      if (block(row) != before && block(row) != behind) continue;
-      MeanModel moved = fit.model;
-      moved.terms[t].parameters[k] = row;
-      JointFit there = fit_jointly(observations_, moved, rows_);
-      if (there.variances.log_likelihood > fit.variances.log_likelihood) fit = std::move(there);
-    }
-  }
-  return fit;
+  Term& step = fit.model.terms[t];
+  if (!step.effect->has_change_point()) return fit;
+  const StepProfile profile = step_profile(observations_, fit.model, t, rows_);
+  if (profile.empty() || profile.likeliest() == first_row_of(step)) return fit;
+  MeanModel moved = fit.model;
+  moved.terms[t].parameters[step.effect->change_point().value()] = profile.likeliest();
+  JointFit there = fit_jointly(observations_, moved, rows_);
+  return there.variances.log_likelihood > fit.variances.log_likelihood ? there : fit;
 }
 
 }  // namespace tunnelrig

@@ -1,6 +1,7 @@
 // Intervals hold what they say they hold, over many simulated samples.
 #include "analysis/residual/explanation_parts.h"
 #include "analysis/residual/simulated.h"
+#include "analysis/residual/step_profile.h"
 #include "support/seeds.h"
 
 #include <cmath>
@@ -87,6 +88,29 @@ TEST_F(Intervals, OfAGroupsAmplitudeAllowForSessions) {
       held += own.low <= 0 && 0 <= own.high ? 1 : 0;
   }
   EXPECT_GT(held, 0.9 * kGroups * kSamples);
+}
+
+/// Where it is not the likeliest place: the step is sought on from a place beside it.
+TEST_F(Intervals, OfAStepsFirstRunHoldIt) {
+  constexpr int kSamples = 200;
+  constexpr double kSigma = 0.002;
+  for (const double size : {0.75, 1.5, 3.0}) {
+    int held = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      Observations o = test::simulate(
+          {.runs_of_block = std::vector<int>(160, 1), .groups = 1, .sigma = kSigma, .session_ratio = 0},
+          random);
+      o.blocks_are_rows = true;
+      o.covariates.push_back({"run_order", Eigen::VectorXd::LinSpaced(o.rows(), 0, 159), true});
+      const int first = std::uniform_int_distribution<int>(40, 120)(random);
+      test::add_effect(o, "propeller_step", {size * kSigma, static_cast<double>(first)});
+      const Term beside{.effect = &test::effect_named("propeller_step"), .parameters = {0, first + 3.0}};
+      const StepProfile profile = step_profile(o, {{beside}, {}}, 0, o.all_rows());
+      ASSERT_FALSE(profile.empty());
+      held += profile.lowest() <= first && first <= profile.highest() ? 1 : 0;
+    }
+    EXPECT_GT(held, 0.91 * kSamples) << size << " sigma";
+  }
 }
 
 }  // namespace
