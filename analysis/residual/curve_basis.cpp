@@ -23,13 +23,16 @@ double curve_straight(CurveShape shape, double x, double low, double high) {
   const double u = is_of_logarithm(shape) ? x > 0 ? std::log(x / low) / std::log(high / low)
                                                   : -std::numeric_limits<double>::infinity()
                                           : (x - low) / (high - low);
-  const double farthest = shape == CurveShape::kWaves ? 1 : kFarthestBend;
+  const bool stays = shape == CurveShape::kWaves || shape == CurveShape::kSmooth;
+  const double farthest = stays ? 1 : kFarthestBend;
   return std::clamp(2 * u - 1, -farthest, farthest);
 }
 
 double curve_column(CurveShape shape, int k, double x, double low, double high) {
   const double s = curve_straight(shape, x, low, high);
-  if (shape == CurveShape::kWaves) return std::cos(std::numbers::pi * k * (s + 1) / 2);
+  const auto wave = [s](int number) { return std::cos(std::numbers::pi * number * (s + 1) / 2); };
+  if (shape == CurveShape::kWaves) return wave(k);
+  if (shape == CurveShape::kSmooth) return k == 1 ? s : k == 2 ? s * s : wave(k - 2);
   if (k > 1 || shape == CurveShape::kStraight || shape == CurveShape::kLogStraight) return s;
   return shape == CurveShape::kLevelling ? std::pow(low / high, (s + 1) / 2) : s * s;
 }
@@ -48,6 +51,8 @@ std::string_view name_of(CurveShape shape) {
   switch (shape) {
     case CurveShape::kWaves:
       return "waves";
+    case CurveShape::kSmooth:
+      return "smooth";
     case CurveShape::kParabola:
       return "parabola";
     case CurveShape::kLogParabola:
@@ -66,8 +71,8 @@ std::string_view name_of(CurveShape shape) {
 
 std::optional<CurveShape> curve_shape(std::string_view name) {
   for (const CurveShape shape :
-       {CurveShape::kWaves, CurveShape::kParabola, CurveShape::kLogParabola, CurveShape::kLevelling,
-        CurveShape::kStraight, CurveShape::kLogStraight, CurveShape::kLevels})
+       {CurveShape::kWaves, CurveShape::kSmooth, CurveShape::kParabola, CurveShape::kLogParabola,
+        CurveShape::kLevelling, CurveShape::kStraight, CurveShape::kLogStraight, CurveShape::kLevels})
     if (name_of(shape) == name) return shape;
   return {};
 }

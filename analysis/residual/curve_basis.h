@@ -8,7 +8,8 @@
 namespace tunnelrig {
 
 enum class CurveShape {
-  kWaves,        // cos(π k u), u = (x − low)/(high − low), k = 1 …: bends of ever shorter length
+  kWaves,   // cos(π k u), u = (x − low)/(high − low), k = 1 …: bends of ever shorter length
+  kSmooth,  // s, s², cos(π k u), k = 1 … (Eubank & Speckman 1990): what waves have found, as it is drawn
   kParabola,     // s², s = 2u − 1: what a straight line lacks; s where it stands alone
   kLogParabola,  // the same over ln x: what a power law lacks
   kLevelling,    // low/x, with s of ln x: the same, but less and less where x grows
@@ -41,7 +42,7 @@ double tilted_column(CurveShape shape, const std::vector<double>& tilt, std::siz
 /// The k-th column (from 1) of levels: whether x is levels[k].
 double level_column(const std::vector<double>& levels, int k, double x);
 
-/// "waves", "parabola", "log_parabola", "levelling", "straight", "log_straight", "levels".
+/// "waves", "smooth", "parabola", "log_parabola", "levelling", "straight", "log_straight", "levels".
 std::string_view name_of(CurveShape shape);
 std::optional<CurveShape> curve_shape(std::string_view name);
 

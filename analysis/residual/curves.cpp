@@ -77,23 +77,6 @@ double widest_gap(const Covariate& covariate, const std::vector<int>& rows) {
   return gap / (*values.rbegin() - *values.begin());
 }
 
-/// How many values there are at least a hundredth of the range apart: four speeds that scatter a little are
-/// four, and between them a wave has any height.
-int places_on_range(const Covariate& covariate, const std::vector<int>& rows) {
-  constexpr double kApart = 0.01;
-  std::set<double> values;
-  for (const int row : rows) values.insert(covariate.value(row, 0));
-  const double range = *values.rbegin() - *values.begin();
-  int count = 0;
-  auto next = values.begin();
-  while (next != values.end()) {
-    ++count;
-    const auto apart = values.lower_bound(*next + kApart * range);
-    next = apart == next ? std::next(next) : apart;
-  }
-  return count;
-}
-
 /// What is straight, on the curve's rotors.
 MatrixXd straight_over(const Curve& curve) {
   const MatrixXd& column = curve.columns[0][0];
@@ -238,6 +221,21 @@ double share_beside_cubics(const Observations& observations, const std::vector<i
   return whole.squaredNorm() > 0 ? left.squaredNorm() / whole.squaredNorm() : 0;
 }
 
+int places_on_range(const Covariate& covariate, const std::vector<int>& rows) {
+  constexpr double kApart = 0.01;
+  std::set<double> values;
+  for (const int row : rows) values.insert(covariate.value(row, 0));
+  const double range = *values.rbegin() - *values.begin();
+  int count = 0;
+  auto next = values.begin();
+  while (next != values.end()) {
+    ++count;
+    const auto apart = values.lower_bound(*next + kApart * range);
+    next = apart == next ? std::next(next) : apart;
+  }
+  return count;
+}
+
 int different_values(const Covariate& covariate, const std::vector<int>& rows) {
   std::set<double> values;
   for (const int row : rows) values.insert(covariate.value(row, 0));
@@ -331,6 +329,29 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
       curves.push_back(
           {.covariate = "time_in_run", .rotor = rotor, .columns = course(observations, rotor), .x = {}});
   return curves;
+}
+
+std::vector<Curve> smooth_forms(const Observations& observations, const Curve& curve,
+                                const std::vector<int>& rows) {
+  const Covariate* covariate = observations.find(curve.covariate);
+  const bool bend = curve.shape == CurveShape::kParabola || is_of_logarithm(curve.shape);
+  const bool smooth = bend || curve.shape == CurveShape::kWaves || curve.shape == CurveShape::kSmooth;
+  if (covariate == nullptr || !smooth || !curve.tilt.empty() || !curve.everywhere()) return {};
+  const auto form_of = [&](CurveShape shape, int count) {
+    Curve form = curve;
+    form.shape = shape;
+    form.columns = columns_over(observations, *covariate, curve.rotor, count, [&](int k, double x) {
+      return curve_column(shape, k, x, curve.low, curve.high);
+    });
+    return form;
+  };
+  const int most = std::clamp(places_on_range(*covariate, rows) / 3, 2, kBends.back() + 2);
+  std::vector<Curve> forms;
+  for (int count = 1; count <= (is_of_logarithm(curve.shape) ? 2 : most); ++count) {
+    if (widest_gap(*covariate, rows) * (count - 2) > 2) break;
+    forms.push_back(form_of(bend && count <= 2 ? curve.shape : CurveShape::kSmooth, count));
+  }
+  return forms;
 }
 
 bool is_over(const Curve& curve, const std::vector<std::string>& covariates) {

@@ -60,6 +60,10 @@ bool can_be_followed(const Observations& observations, const Covariate& covariat
 double share_beside_cubics(const Observations& observations, const std::vector<int>& rows,
                            const std::vector<Eigen::VectorXd>& conditions, const Eigen::VectorXd& column);
 
+/// How many of the first channel's values in `rows` are at least a hundredth of the range apart: four speeds
+/// that scatter a little are four, and between them a wave has any height.
+int places_on_range(const Covariate& covariate, const std::vector<int>& rows);
+
 /// How many values `rows` have; of the first channel.
 int different_values(const Covariate& covariate, const std::vector<int>& rows);
 
@@ -72,6 +76,11 @@ Curve without_trend(const Curve& curve, const std::vector<int>& rows);
 
 /// A curve without its straight part that has to do all of the covariate's work: the same with it.
 Curve with_trend(const Curve& curve);
+
+/// What waves or a bend have found, as a smooth curve of 1, 2 … columns, as many as its covariate can show.
+/// Empty for others, and for bends beside a name.
+std::vector<Curve> smooth_forms(const Observations& observations, const Curve& curve,
+                                const std::vector<int>& rows);
 
 /// Whether one of these covariates is what the curve is over.
 bool is_over(const Curve& curve, const std::vector<std::string>& covariates);

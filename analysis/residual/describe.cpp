@@ -21,6 +21,13 @@ struct Drawn {
   VectorXd columns;
 };
 
+/// A curve is known but for a constant: it is drawn about its mean, and its band is of that.
+void centre(std::vector<Drawn>& points) {
+  VectorXd mean = VectorXd::Zero(points[0].columns.size());
+  for (const Drawn& point : points) mean += point.columns / static_cast<double>(points.size());
+  for (Drawn& point : points) point.columns -= mean;
+}
+
 std::vector<Drawn> drawn_levels(const Curve& curve) {
   const auto k = static_cast<Index>(curve.columns.size());
   std::vector<double> levels = curve.levels;
@@ -31,10 +38,6 @@ std::vector<Drawn> drawn_levels(const Curve& curve) {
     for (Index b = 0; b < k; ++b)
       points.back().columns(b) = level_column(curve.levels, static_cast<int>(b) + 1, x);
   }
-  // None of them stands apart: each is held against the mean of all, and its band is of that.
-  VectorXd mean = VectorXd::Zero(k);
-  for (const Drawn& point : points) mean += point.columns / static_cast<double>(points.size());
-  for (Drawn& point : points) point.columns -= mean;
   return points;
 }
 
@@ -51,6 +54,12 @@ std::vector<Drawn> drawn_curve(const Curve& curve, double from, double to, doubl
       points.back().columns.array() -= curve_straight(curve.shape, curve.x.mean(), low, high);
   }
   return points;
+}
+
+/// Of a smooth curve two columns more than its data asked for: what it then lacks is less than its band.
+Curve as_drawn(const Observations& observations, const Curve& curve, const std::vector<int>& rows) {
+  const std::vector<Curve> forms = smooth_forms(observations, curve, rows);
+  return forms.empty() ? curve : forms[std::min(curve.columns.size() + 1, forms.size() - 1)];
 }
 
 /// What is straight over a condition along which each group has a line (or a power law) of its own is that
@@ -113,41 +122,35 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
     result.covariate_unit = covariate->unit;
     if (covariate->derived) result.covariate = column_behind(covariate->name);
   }
+  const Curve curve = as_drawn(observations, found.curve, rows);
+  std::vector<Components> columns = fit.linear.columns;
+  auto last = columns.end();
+  for (auto other = fit.model.curves.rbegin(); !other->is_like(found.curve); ++other)
+    last -= static_cast<std::ptrdiff_t>(other->columns.size());
+  columns.erase(last - static_cast<std::ptrdiff_t>(found.curve.columns.size()), last);
+  columns.insert(columns.end(), curve.columns.begin(), curve.columns.end());
   const Components y = difference(response_components(observations), fit.linear.offset);
-  const AmplitudeFit amplitudes = fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);
-  Index first = static_cast<Index>(fit.linear.columns.size());
-  for (auto curve = fit.model.curves.rbegin(); curve != fit.model.curves.rend(); ++curve) {
-    first -= static_cast<Index>(curve->columns.size());
-    if (curve->is_like(found.curve)) break;
-  }
-  const Index k = static_cast<Index>(found.curve.columns.size());
-  const VectorXd amplitude = amplitudes.amplitude.segment(first, k);
-  const MatrixXd covariance = amplitudes.covariance.block(first, first, k, k);
+  const AmplitudeFit amplitudes = fit_amplitudes(observations, y, columns, fit.variances, rows);
+  const auto k = static_cast<Index>(curve.columns.size());
+  const VectorXd amplitude = amplitudes.amplitude.tail(k);
+  const MatrixXd covariance = amplitudes.covariance.bottomRightCorner(k, k);
   const double scale = observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
   const bool within = found.curve.x.size() == 0;
   const double duration_s = observations.duration_s.maxCoeff();
-  const Curve& curve = found.curve;
   std::vector<Drawn> points =
       result.levels ? drawn_levels(curve)
       : within      ? drawn_curve(curve, 0, duration_s, 0, duration_s)
                     : drawn_curve(curve, curve.x.minCoeff(), curve.x.maxCoeff(), curve.low, curve.high);
   if (!result.levels) take_out_baseline(observations, rows, curve, points);
-  double mean = 0;
+  if (!curve.strength) centre(points);
+  double lowest = 1e300, highest = -1e300;
   for (const Drawn& point : points) {
     const double value = scale * point.columns.dot(amplitude),
                  half =
                      1.96 * scale * std::sqrt(std::max(0.0, point.columns.dot(covariance * point.columns)));
     result.shape.push_back({point.x, value, value - half, value + half});
-    mean += value;
-  }
-  mean = found.curve.strength ? 0 : mean / static_cast<double>(result.shape.size());
-  double lowest = 1e300, highest = -1e300;
-  for (ShapePoint& point : result.shape) {
-    point.y -= mean;
-    point.low -= mean;
-    point.high -= mean;
-    lowest = std::min(lowest, point.y);
-    highest = std::max(highest, point.y);
+    lowest = std::min(lowest, value);
+    highest = std::max(highest, value);
   }
   result.amplitude = (highest - lowest) / 2;
   return result;
@@ -169,14 +172,20 @@ UnknownStructure describe_sessions(const Observations& observations, const Matri
     const double mean = -residual.row(static_cast<Index>(r)).mean();
     if (!std::isnan(mean)) offsets[observations.block[static_cast<std::size_t>(rows[r])]].push_back(mean);
   }
+  const auto mean_of = [](const std::vector<double>& values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  };
+  double squares = 0, free = 0;  // of all sessions' runs: one may have a single run
+  for (const auto& [block, values] : offsets) {
+    for (const double value : values) squares += std::pow(value - mean_of(values), 2);
+    free += static_cast<double>(values.size()) - 1;
+  }
+  free = std::max(1.0, free);
   double lowest = 1e300, highest = -1e300;
   for (const auto& [block, values] : offsets) {
-    const double n = static_cast<double>(values.size());
-    const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
-    double squares = 0;
-    for (const double value : values) squares += (value - mean) * (value - mean);
-    const double free = std::max(1.0, n - 1);
-    const double half = student_t_quantile(0.975, free) * std::sqrt(squares / free / n);
+    const double mean = mean_of(values);
+    const double half =
+        student_t_quantile(0.975, free) * std::sqrt(squares / free / static_cast<double>(values.size()));
     result.shape.push_back({static_cast<double>(block + 1), mean, mean - half, mean + half});
     lowest = std::min(lowest, mean);
     highest = std::max(highest, mean);

@@ -147,6 +147,9 @@ class Search {
   /// `first`: the curves on top of the model as it is.
   void add_curves(const CurveScan& first);
   bool add_best_curve(const CurveScan& curves);
+  /// Waves find structure of any shape, but a straight line in them has bends, and a bend has its middle at
+  /// that of the range: what they found becomes a smooth curve of as many columns as the data ask for.
+  void smooth_curves();
   /// A name whose work a curve does as well was the wrong name for that curve.
   void drop_what_a_curve_replaces();
   /// Whether an effect is beyond chance among all candidates with the curves in: what was found while their

@@ -81,6 +81,31 @@ void Search::add_curve(const Curve& curve, double p) {
   read_back_terms();
 }
 
+void Search::smooth_curves() {
+  for (std::size_t c = 0; c < result_.curves.size(); ++c) {
+    const std::vector<Curve> forms = smooth_forms(observations_, result_.curves[c].curve, rows_);
+    if (forms.empty()) continue;
+    MeanModel rest = fit_.model;
+    rest.curves.erase(rest.curves.begin() + static_cast<std::ptrdiff_t>(c));
+    const JointFit without = fit_jointly(observations_, rest, rows_);
+    std::vector<Candidate> candidates;
+    for (const Curve& form : forms) candidates.push_back(as_candidate(form));
+    const auto fits =
+        CandidateScan(*mixed_, without.linear.columns, candidates).fit(difference(y_, without.linear.offset));
+    const double n = places_on_range(*observations_.find(forms[0].covariate), rows_);
+    const auto criterion = [&](std::size_t i) {  // Hurvich & Tsai 1989
+      const auto k = static_cast<double>(i + 1);
+      return 2 * k * n / std::max(n - k - 2, 1.0) - 2 * fits[i].likelihood_ratio;
+    };
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < forms.size(); ++i)
+      if (criterion(i) < criterion(best)) best = i;
+    result_.curves[c].curve = fit_.model.curves[c] = forms[best];
+    fit_ = fit_jointly(observations_, fit_.model, rows_);
+    read_back_terms();
+  }
+}
+
 /// That the response depends on the covariate is settled; this asks whether it does so by the formula. The
 /// test is one bend for one effect, and needs no maximum over everything.
 void Search::doubt_formulas() {

@@ -5,6 +5,7 @@
 #include "support/seeds.h"
 
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -110,6 +111,40 @@ TEST_F(Intervals, OfAStepsFirstRunHoldIt) {
       held += profile.lowest() <= first && first <= profile.highest() ? 1 : 0;
     }
     EXPECT_GT(held, 0.91 * kSamples) << size << " sigma";
+  }
+}
+
+/// Of what has no name, about its mean: whatever its shape is.
+TEST_F(Intervals, OfACurveHoldItsShape) {
+  constexpr int kSamples = 30;
+  constexpr double kSigma = 0.002;
+  const auto straight = [](double x) { return 1.5 * x; };
+  const auto bend = [](double x) { return 2.5 * x * x; };
+  const auto wave = [](double x) { return 1.5 * std::sin(2.5 * x); };
+  for (const std::function<double(double)>& shape :
+       {std::function<double(double)>(straight), std::function<double(double)>(bend),
+        std::function<double(double)>(wave)}) {
+    double held = 0, points = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      Observations o = test::simulate(
+          {.runs_of_block = std::vector<int>(20, 8), .groups = 2, .sigma = kSigma, .session_ratio = 0},
+          random);
+      test::add_covariate(o, "humidity_of_paper", -1, 1, random);
+      test::set_y(o, o.y + kSigma * o.find("humidity_of_paper")->value.unaryExpr(shape));
+      const Explanation e = test::explained(o);
+      ASSERT_EQ(e.unknown.size(), 1u);
+      const auto& drawn = e.unknown[0].shape;
+      const double scale = kSigma * o.value.mean();
+      double mean = 0;
+      for (const ShapePoint& point : drawn)
+        mean += scale * shape(point.x) / static_cast<double>(drawn.size());
+      for (const ShapePoint& point : drawn) {
+        const double truth = scale * shape(point.x) - mean;
+        held += point.low <= truth && truth <= point.high ? 1 : 0;
+        ++points;
+      }
+    }
+    EXPECT_GT(held, 0.88 * points);
   }
 }
 
