@@ -144,11 +144,12 @@ class Page {
     return by_mode * mixed.rotors_of_modes();
   }
 
-  /// Points of one covariate: the residual with everything else in, and what this term makes of it. Of a
+  /// Points of one covariate: the residual with everything else in, and what this term makes of it, with half
+  /// of its band's height where it has one. Of a
   /// place: runs where it counts by half or more, turned round where it is below zero; of another condition
   /// that half of the runs where it counts more.
   Json panel(const std::string& label, const std::string& covariate, const MatrixXd& x, int rotor,
-             const MatrixXd& fitted, const Curve& curve = {}) const {
+             const MatrixXd& fitted, const Curve& curve = {}, const MatrixXd& half = {}) const {
     const VectorXd& weight_of_run = curve.place.weight;
     const double least_shown = curve.strength ? upper_median(sizes_of(weight_of_run)) : kLeastShown;
     const Covariate* known = observations_.find(covariate);
@@ -173,6 +174,7 @@ class Page {
         json["before"].push_back(drawn(side * (after_(row, c) + fitted(row, c))));
         json["after"].push_back(drawn(side * after_(row, c)));
         json["fitted"].push_back(drawn(side * fitted(row, c)));
+        if (half.size() > 0) json["half"].push_back(drawn(std::abs(weight) * half(row, c)));
       }
     }
     return json;
@@ -220,16 +222,19 @@ class Page {
       if (curve.covariate != unknown.condition || curve.rotor != unknown.rotor ||
           curve.in_place() != unknown.place || curve.times() != unknown.times || curve.x.size() == 0)
         continue;
-      MatrixXd shape = MatrixXd::Zero(observations_.rows(), observations_.channels());
+      MatrixXd shape = MatrixXd::Zero(observations_.rows(), observations_.channels()), half = shape;
       for (Index row = 0; row < shape.rows(); ++row)
-        for (Index c = 0; c < shape.cols(); ++c)
-          if (curve.rotor < 0 || c == curve.rotor)
-            shape(row, c) = unknown.levels
-                                ? at_level(unknown.shape, curve.x(row, 0), curve.levels[0])
-                                : interpolated(unknown.shape, curve.x(row, curve.x.cols() > 1 ? c : 0));
+        for (Index c = 0; c < shape.cols(); ++c) {
+          if (curve.rotor >= 0 && c != curve.rotor) continue;
+          const ShapePoint point =
+              unknown.levels ? at_level(unknown.shape, curve.x(row, 0), curve.levels[0])
+                             : interpolated(unknown.shape, curve.x(row, curve.x.cols() > 1 ? c : 0));
+          shape(row, c) = point.y;
+          half(row, c) = (point.high - point.low) / 2;
+        }
       if (!curve.everywhere()) shape = curve.place.weight.asDiagonal() * shape;
-      list.push_back(
-          panel("unknown: " + curve.label(), curve.covariate, curve.x, curve.rotor, visible(shape), curve));
+      list.push_back(panel("unknown: " + curve.label(), curve.covariate, curve.x, curve.rotor, visible(shape),
+                           curve, half));
       return;
     }
     if (unknown.covariate == "session") {
@@ -241,21 +246,23 @@ class Page {
   }
 
   /// A value that is too rare to be told apart counts as the most common one.
-  static double at_level(const std::vector<ShapePoint>& shape, double x, double most_common) {
+  static ShapePoint at_level(const std::vector<ShapePoint>& shape, double x, double most_common) {
     const auto of = [&](double value) {
       return std::find_if(shape.begin(), shape.end(), [&](const ShapePoint& p) { return p.x == value; });
     };
-    return of(x) != shape.end() ? of(x)->y : of(most_common)->y;
+    return of(x) != shape.end() ? *of(x) : *of(most_common);
   }
 
-  static double interpolated(const std::vector<ShapePoint>& shape, double x) {
-    if (x <= shape.front().x) return shape.front().y;
+  static ShapePoint interpolated(const std::vector<ShapePoint>& shape, double x) {
+    if (x <= shape.front().x) return shape.front();
     for (std::size_t p = 1; p < shape.size(); ++p) {
       if (x > shape[p].x) continue;
-      const double share = (x - shape[p - 1].x) / (shape[p].x - shape[p - 1].x);
-      return shape[p - 1].y + share * (shape[p].y - shape[p - 1].y);
+      const ShapePoint &a = shape[p - 1], &b = shape[p];
+      const double share = (x - a.x) / (b.x - a.x);
+      return {x, std::lerp(a.y, b.y, share), std::lerp(a.low, b.low, share),
+              std::lerp(a.high, b.high, share)};
     }
-    return shape.back().y;
+    return shape.back();
   }
 
   /// Mean course over the runs with its 95 % band, and with the model's terms taken out; % of the run's mean.

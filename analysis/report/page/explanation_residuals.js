@@ -70,6 +70,21 @@ const runText = (i, channel) => {
   return plain(`${runs.name[i]} at ${runs.location[i]}${rotor}`);
 };
 
+/** A band about a line, under it. */
+function bandOf(x, middle, half, colour) {
+  const edge = (sign, more) => ({
+    type: 'scatter',
+    mode: 'lines',
+    x,
+    y: middle.map((v, i) => v + sign * half[i]),
+    line: {width: 0},
+    hoverinfo: 'skip',
+    showlegend: false,
+    ...more
+  });
+  return [edge(-1, {}), edge(1, {fill: 'tonexty', fillcolor: `${colour}33`})];
+}
+
 /** Clouds of residuals with the means of like x, and what the effect makes of them. */
 function drawPanel(panel, which, reach) {
   const bins = binsOf(panel.x), means = binned(panel.x, panel[which], bins);
@@ -100,12 +115,15 @@ function drawPanel(panel, which, reach) {
   const fitted = which === 'before' && panel.fitted.some((v) => v !== 0);
   if (fitted) {
     const curve = binned(panel.x, panel.fitted, bins);
+    const half = panel.half ? binned(panel.x, panel.half, bins).middle : [];
+    if (half.length && !texts.length) data.push(...bandOf(curve.at, curve.middle, half, orange));
     data.push({
       type: 'scatter',
       mode: texts.length ? 'markers' : 'lines+markers',  // nothing lies between texts
       name: 'fitted',
       x: curve.at,
       y: curve.middle,
+      error_y: {type: 'data', array: half, color: orange, visible: half.length > 0 && texts.length > 0},
       line: {color: orange, width: 2.5},
       marker: {color: orange, size: 8, symbol: 'diamond-open'},
       hovertemplate: 'fitted at %{x:.4g}: %{y:.4g}<extra></extra>'
@@ -124,7 +142,7 @@ function drawPanel(panel, which, reach) {
       xaxis: axis(covariateTitle(panel.covariate, panel.covariate_unit), {zeroline: false, ...ticks}),
       yaxis: axis(residualTitle(), {range: [-reach, reach]}),
       showlegend: true,
-      legend: {orientation: 'h', y: 1.02, yanchor: 'bottom'}
+      legend: {orientation: 'h', y: 1.02, yanchor: 'bottom', traceorder: 'normal'}
     }
   };
 }
@@ -147,12 +165,17 @@ function panelFigure(panel, made) {
       sentences(
           `Grey: every run, ${of}; blue: means of runs of like ${panel.covariate} with 95 % intervals`,
           'from the runs’ scatter; orange: what the fitted model makes of it for the same runs, without what the baseline’s',
-          'own coefficients absorb. Left: everything else that was found is taken out. Right: this too.',
+          `own coefficients absorb${panel.half ? ', with its 95 % band' : ''}.`,
+          'Left: everything else that was found is taken out. Right: this too.',
           panel.place ?
-              `Only runs where ${panel.place} is 0.5 or more; below −0.5 too, with the sign of what was measured turned round.` :
+              `Only runs where ${
+                  panel
+                      .place} is 0.5 or more; below −0.5 too, with the sign of what was measured turned round.` :
               '',
           panel.times ?
-              `Only that half of the runs where ${panel.times} is farther from its mean; below the mean with the sign of what was measured turned round.` :
+              `Only that half of the runs where ${
+                  panel
+                      .times} is farther from its mean; below the mean with the sign of what was measured turned round.` :
               '');
   const plots = session ? one('after', 'sessions') :
                           h('div', {class: 'pair'}, one('before', 'before'), one('after', 'after'));
@@ -215,22 +238,9 @@ function drawCourse(course, which, reach) {
   const seconds = course.u.map((u) => u * course.duration_s);
   const middle = which === 'before' ? course.measured : course.after;
   const half = which === 'before' ? course.half : course.after_half;
-  const edge = (sign, more) => ({
-    type: 'scatter',
-    mode: 'lines',
-    x: seconds,
-    y: middle.map((v, i) => v + sign * half[i]),
-    line: {width: 0},
-    hoverinfo: 'skip',
-    showlegend: false,
-    ...more
-  });
   const line = (name, y, colour, dash) =>
       ({type: 'scatter', mode: 'lines', name, x: seconds, y, line: {color: colour, width: 2.5, dash}});
-  const data = [
-    edge(-1, {}), edge(1, {fill: 'tonexty', fillcolor: `${blue}33`}),
-    line('mean of the runs', middle, blue, 'solid')
-  ];
+  const data = [...bandOf(seconds, middle, half, blue), line('mean of the runs', middle, blue, 'solid')];
   if (which === 'before') data.push(line('model', course.model, orange, 'dash'));
   return {
     data,
