@@ -62,6 +62,27 @@ TEST_F(Gates, TwoFormulasThatCancelEachOtherAreNotBothNamed) {
   for (const AdoptedEffect& adopted : e.adopted) EXPECT_LT(std::abs(adopted.parameters[0].value), 0.1);
 }
 
+/// The wind goes with what two causes do together: beside one of them the other explains more than it did.
+TEST_F(Gates, ANameThatStoodForTwoCausesGivesWayToThem) {
+  Observations o = observations();
+  std::normal_distribution<double> normal(0, 1);
+  VectorXd supply(o.rows()), cable(o.rows()), both(o.rows());
+  for (Index row = 0; row < o.rows(); ++row) {
+    supply(row) = normal(random);
+    cable(row) = normal(random);
+    both(row) = (supply(row) + cable(row)) / std::numbers::sqrt2 + 0.5 * normal(random);
+  }
+  o.covariates.push_back({"supply_voltage_V", 15.5 * (0.02 * supply).array().exp().matrix()});
+  o.covariates.push_back({"cable_force_N", 0.14 * cable});
+  o.covariates.push_back({"tunnel_airspeed_m_s", (20 + 3 * both.array()).sqrt().matrix()});
+  test::add_effect(o, "supply_voltage", {1});
+  test::add_effect(o, "cable_force", {1});
+  const Explanation e = explained(o);
+  ASSERT_FALSE(e.rounds.empty());
+  EXPECT_THAT(e.rounds[0].outcome, HasSubstr("axial_wind")) << "the wind comes first";
+  EXPECT_THAT(names(e), testing::UnorderedElementsAre("supply_voltage", "cable_force"));
+}
+
 TEST_F(Gates, SpeedIsNamedWhereItsReadingIsGood) {
   Observations o = observations();
   add_speed(o, 25, 0.5);
