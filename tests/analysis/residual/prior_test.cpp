@@ -109,5 +109,32 @@ TEST_F(Prior, ANameAtItsBoundIsNone) {
   EXPECT_EQ(e.unknown[0].covariate, "supply_voltage_V");
 }
 
+/// Names are tried before curves: the wind goes with what nobody has a name for.
+TEST_F(Prior, ANameIsTakenBackWhereACurveShowsThatItStoodForAnother) {
+  Observations o = observations();
+  test::add_covariate(o, "humidity_of_paper", -1, 1, random);
+  const VectorXd paper = o.find("humidity_of_paper")->value;
+  VectorXd wind(o.rows());
+  for (Index row = 0; row < o.rows(); ++row)
+    wind(row) = std::sqrt(4 + paper(row) + std::normal_distribution<double>(0, 0.5)(random));
+  o.covariates.push_back({"tunnel_airspeed_m_s", wind});
+  test::set_y(o, o.y.colwise() + VectorXd(0.01 * paper));
+  const Explanation e = explained(o);
+  EXPECT_THAT(e.rounds.at(0).outcome, testing::HasSubstr("accepted axial_wind"));
+  EXPECT_THAT(names(e), ElementsAre());
+  ASSERT_EQ(e.unknown.size(), 1u);
+  EXPECT_EQ(e.unknown[0].covariate, "humidity_of_paper");
+}
+
+/// What two waves have found.
+TEST_F(Prior, ACurveHasAsManyColumnsAsItNeeds) {
+  Observations o = observations();
+  test::add_covariate(o, "humidity_of_paper", -1, 1, random);
+  test::set_y(o, o.y.colwise() + VectorXd(0.01 * o.find("humidity_of_paper")->value));
+  const Explanation e = explained(o);
+  ASSERT_EQ(e.model.curves.size(), 1u);
+  EXPECT_EQ(e.model.curves[0].columns.size(), 1u) << "a straight line";
+}
+
 }  // namespace
 }  // namespace tunnelrig
