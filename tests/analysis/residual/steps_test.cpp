@@ -1,6 +1,7 @@
 // Steps: where they are, and what is none.
 #include "analysis/residual/explanation_output.h"
 #include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/step_profile.h"
 #include "analysis/residual/tables.h"
 
 #include <gmock/gmock.h>
@@ -156,6 +157,24 @@ TEST_F(Steps, SealedRunsWhereItMayLieAreNotScored) {
   ASSERT_EQ(e.adopted.size(), 1u) << names(e);
   EXPECT_THAT(e.warnings, Contains(HasSubstr("not scored: " + o.name[static_cast<std::size_t>(first)])));
   EXPECT_LT(e.after.held_out_rmse, 1.4 * e.noise_floor);
+}
+
+/// A step is tried at one row of three, and placed at any.
+TEST_F(Steps, InALongTableAreFoundWhereTheyAre) {
+  Observations o = test::simulate(
+      {.runs_of_block = std::vector<int>(640, 1), .groups = 1, .sigma = 0.002, .session_ratio = 0}, random);
+  o.blocks_are_rows = o.from_table = true;
+  o.covariates.push_back({"run_order", Eigen::VectorXd::LinSpaced(o.rows(), 0, 639), true});
+  const auto all = o.all_rows();
+  EXPECT_LE(ways_to_try(test::effect_named("propeller_step"), o, all).size(), 300u);
+  for (const Index first : {300, 301, 302}) {
+    Observations stepped = o;
+    step(stepped, first, 0, 0.02);
+    const auto effects = test::every_effect();
+    const Attribution found = attribute(stepped, all, effects, test::quick());
+    ASSERT_EQ(found.accepted.size(), 1u);
+    EXPECT_EQ(first_row_of(found.final.model.terms[0]), first);
+  }
 }
 
 }  // namespace
