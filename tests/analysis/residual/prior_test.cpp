@@ -46,12 +46,15 @@ struct Prior : testing::Test {
   }
 };
 
-/// A share of clipped samples that goes with the pressure to the last digit.
+/// A share of clipped samples that goes with the pressure, and with the thrust a little better.
 TEST_F(Prior, WhereTheoryGivesTheCoefficientANameIsLikelier) {
   Observations o = observations();
-  const MatrixXd& pressure_Pa = o.find("air_pressure_Pa")->value;
-  o.covariates.push_back({"clip_fraction", 0.2 - 0.1 * (pressure_Pa.array() / 101325).log()});
+  MatrixXd& pressure_Pa = o.covariates.back().value;
+  const MatrixXd clipped = 0.2 - 0.1 * (pressure_Pa.array() / 101325).log();
   test::add_effect(o, "air_pressure", {1});
+  std::normal_distribution<double> reading(0, 20);
+  for (Index row = 0; row < o.rows(); ++row) pressure_Pa(row, 0) += reading(random);
+  o.covariates.push_back({"clip_fraction", clipped});
   const Explanation e = explained(o);
   ASSERT_EQ(names(e), std::vector<std::string>{"air_pressure"});
   EXPECT_THAT(e.adopted[0].confounded_with, Contains("adc_clipping"));
