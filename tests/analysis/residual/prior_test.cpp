@@ -52,7 +52,7 @@ TEST_F(Prior, WhereTheoryGivesTheCoefficientANameIsLikelier) {
   MatrixXd& pressure_Pa = o.covariates.back().value;
   const MatrixXd clipped = 0.2 - 0.1 * (pressure_Pa.array() / 101325).log();
   test::add_effect(o, "air_pressure", {1});
-  std::normal_distribution<double> reading(0, 20);
+  std::normal_distribution<double> reading(0, 8);
   for (Index row = 0; row < o.rows(); ++row) pressure_Pa(row, 0) += reading(random);
   o.covariates.push_back({"clip_fraction", clipped});
   const Explanation e = explained(o);
