@@ -135,6 +135,8 @@ CanBeFound::CanBeFound(const Observations& observations)
     : observations_(observations),
       rows_(observations.all_rows()),
       baseline_(MixedModel::baseline_alone(observations, rows_)),
+      // has_evidence_ is set by a constructor that clang-tidy does not see.
+      // NOLINTNEXTLINE(clang-analyzer-optin.cplusplus.UninitializedObject)
       has_evidence_(observations, baseline_) {}
 
 Testability CanBeFound::operator()(const Effect& effect) const {

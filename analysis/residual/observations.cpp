@@ -35,9 +35,10 @@ std::map<int, std::vector<int>> rows_of_each(const std::vector<int>& number, con
   return result;
 }
 
-std::vector<std::vector<Eigen::Index>> without_numbers(std::map<int, std::vector<Eigen::Index>> places) {
+std::vector<std::vector<Eigen::Index>> without_numbers(
+    const std::map<int, std::vector<Eigen::Index>>& places) {
   std::vector<std::vector<Eigen::Index>> result;
-  for (auto& [number, own] : places) result.push_back(std::move(own));
+  for (const auto& [number, own] : places) result.push_back(own);
   return result;
 }
 

@@ -48,7 +48,8 @@ std::map<int, std::vector<Eigen::Index>> places_of_each(const std::vector<int>& 
 std::map<int, std::vector<int>> rows_of_each(const std::vector<int>& number, const std::vector<int>& rows);
 
 /// Places in the order of their numbers.
-std::vector<std::vector<Eigen::Index>> without_numbers(std::map<int, std::vector<Eigen::Index>> places);
+std::vector<std::vector<Eigen::Index>> without_numbers(
+    const std::map<int, std::vector<Eigen::Index>>& places);
 
 /// A column of texts; an empty cell is a text as well.
 Covariate covariate_of_texts(const std::string& name, const std::vector<std::string>& texts);
