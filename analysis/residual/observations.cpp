@@ -58,13 +58,6 @@ std::vector<int> Observations::all_rows() const {
   return all;
 }
 
-bool Observations::blocks_follow_each_other() const {
-  std::set<int> seen;
-  for (std::size_t row = 0; row < block.size(); ++row)
-    if ((row == 0 || block[row] != block[row - 1]) && !seen.insert(block[row]).second) return false;
-  return true;
-}
-
 Eigen::VectorXd RunScatter::of_runs(const std::vector<int>& rows) const {
   Eigen::VectorXd result = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(rows.size()));
   for (const Eigen::VectorXd* scatter : {&runs, &by_condition.runs})

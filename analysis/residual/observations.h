@@ -133,8 +133,6 @@ struct Observations {
   int groups() const { return static_cast<int>(group_name.size()); }
   int blocks() const { return static_cast<int>(block_name.size()); }
   std::vector<int> all_rows() const;
-  /// Whether each block's rows follow each other. A table's need not.
-  bool blocks_follow_each_other() const;
   /// v = b + g T of a cell: what it reads without a load is no force. A thrust over a condition has none.
   bool is_line() const { return line_of_cell; }
   bool is_power_law() const { return baseline.starts_with("power:"); }

@@ -84,6 +84,21 @@ TEST_F(ExplanationPage, FittedEffectIsWhatLiesBetweenBeforeAndAfter) {
   EXPECT_LT(missed2, 0.01 * fitted2);  // sessions weigh in the fit, not in the picture
 }
 
+TEST_F(ExplanationPage, WhatHasNoNameHasItsBand) {
+  campaign("c", {.track = Track::kOutside, .size = 2, .effects = {"humidity_wave"}, .seed = kSeed});
+  const json unknown = explain("c")["unknown"];
+  ASSERT_EQ(unknown.size(), 1u);
+  const json panel = data_of("c")["panels"][0], first = unknown[0]["shape"][0];
+  ASSERT_EQ(panel["half"].size(), panel["x"].size());
+  std::size_t lowest = 0;
+  for (std::size_t i = 0; i < panel["x"].size(); ++i) {
+    EXPECT_GT(panel["half"][i], 0);
+    if (panel["x"][i] < panel["x"][lowest]) lowest = i;
+  }
+  const double half = (first[3].get<double>() - first[2].get<double>()) / 2;
+  EXPECT_NEAR(panel["half"][lowest], half, 1e-3 * half);
+}
+
 TEST_F(ExplanationPage, OpensInABrowser) {
   if (std::system("command -v chromium >/dev/null && command -v node >/dev/null") != 0)
     GTEST_SKIP() << "chromium or node is not installed, so no page was opened";

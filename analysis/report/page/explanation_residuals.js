@@ -168,14 +168,10 @@ function panelFigure(panel, made) {
           `own coefficients absorb${panel.half ? ', with its 95 % band' : ''}.`,
           'Left: everything else that was found is taken out. Right: this too.',
           panel.place ?
-              `Only runs where ${
-                  panel
-                      .place} is 0.5 or more; below −0.5 too, with the sign of what was measured turned round.` :
+              `Only runs where ${panel.place} is 0.5 or more; below −0.5 too, with the sign of what was measured turned round.` :
               '',
           panel.times ?
-              `Only that half of the runs where ${
-                  panel
-                      .times} is farther from its mean; below the mean with the sign of what was measured turned round.` :
+              `Only that half of the runs where ${panel.times} is farther from its mean; below the mean with the sign of what was measured turned round.` :
               '');
   const plots = session ? one('after', 'sessions') :
                           h('div', {class: 'pair'}, one('before', 'before'), one('after', 'after'));
