@@ -85,7 +85,7 @@ TEST_F(ExplanationPage, FittedEffectIsWhatLiesBetweenBeforeAndAfter) {
 }
 
 TEST_F(ExplanationPage, WhatHasNoNameHasItsBand) {
-  campaign("c", {.track = Track::kOutside, .size = 2, .effects = {"humidity_wave"}, .seed = kSeed});
+  campaign("c", {.track = Track::kOutside, .size = 4, .effects = {"humidity_wave"}, .seed = kSeed});
   const json unknown = explain("c")["unknown"];
   ASSERT_EQ(unknown.size(), 1u);
   const json panel = data_of("c")["panels"][0], first = unknown[0]["shape"][0];
