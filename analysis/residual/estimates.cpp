@@ -15,48 +15,81 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-void set_interval(const Observations& observations, const HeldOutErrors& errors, std::uint64_t seed,
-                  ErrorEstimate& estimate) {
-  std::map<int, std::pair<double, double>> blocks;  // squares, count
+namespace {
+
+struct BlockSquares {
+  double sum = 0, count = 0;
+};
+
+std::vector<BlockSquares> squares_of_blocks(const Observations& observations, const HeldOutErrors& errors) {
+  std::map<int, BlockSquares> blocks;
   for (std::size_t r = 0; r < errors.rows.size(); ++r)
-    for (Index c = 0; c < errors.error.cols(); ++c) {
-      const double e = errors.error(static_cast<Index>(r), c);
+    for (const double e : errors.error.row(static_cast<Index>(r))) {
       if (std::isnan(e)) continue;
-      auto& block = blocks[observations.block[static_cast<std::size_t>(errors.rows[r])]];
-      block.first += e * e;
-      block.second += 1;
+      BlockSquares& block = blocks[observations.block[static_cast<std::size_t>(errors.rows[r])]];
+      block.sum += e * e;
+      block.count += 1;
     }
-  estimate.held_out_rmse =
-      errors.count() == 0 ? 0 : std::sqrt(errors.sum_of_squares() / static_cast<double>(errors.count()));
+  std::vector<BlockSquares> list;
+  for (const auto& [id, block] : blocks) list.push_back(block);
+  return list;
+}
+
+/// Bootstrap variance of ln(rms) of as many blocks as `drawn`, out of `blocks`: of one block nothing is known
+/// of how blocks differ.
+double variance_of_log_rms(const std::vector<BlockSquares>& blocks, std::size_t drawn,
+                           std::mt19937_64& random) {
+  if (blocks.size() < 2) return 0;
+  constexpr int kResamples = 1000;
+  std::uniform_int_distribution<std::size_t> pick(0, blocks.size() - 1);
+  std::vector<double> values;
+  for (int k = 0; k < kResamples; ++k) {
+    BlockSquares all;
+    for (std::size_t b = 0; b < drawn; ++b) {
+      const BlockSquares& block = blocks[pick(random)];
+      all.sum += block.sum;
+      all.count += block.count;
+    }
+    if (all.sum > 0) values.push_back(std::log(all.sum / all.count) / 2);
+  }
+  if (values.empty()) return 0;
+  const Eigen::Map<const Eigen::ArrayXd> value(values.data(), static_cast<Index>(values.size()));
+  const double n = static_cast<double>(blocks.size());
+  return (value - value.mean()).square().mean() * n / (n - 1);  // a bootstrap's is short by (n − 1)/n
+}
+
+}  // namespace
+
+void set_interval(const Observations& observations, const HeldOutErrors& sealed, const HeldOutErrors& open,
+                  std::uint64_t seed, ErrorEstimate& estimate) {
+  const double count = static_cast<double>(sealed.count());
+  estimate.held_out_rmse = count > 0 ? std::sqrt(sealed.sum_of_squares() / count) : 0;
   estimate.held_out_low = estimate.held_out_high = estimate.held_out_rmse;
   if (!(estimate.held_out_rmse > 0)) return;
-  std::vector<std::pair<double, double>> list;
-  for (const auto& [id, block] : blocks) list.push_back(block);
+  const std::vector<BlockSquares> blocks = squares_of_blocks(observations, sealed);
+  const std::vector<BlockSquares> others = squares_of_blocks(observations, open);
   std::mt19937_64 random(seed);
-  std::uniform_int_distribution<std::size_t> pick(0, list.size() - 1);
-  constexpr int kResamples = 1000;
-  double sum = 0, squares = 0;
-  for (int k = 0; k < kResamples; ++k) {
-    double total = 0, count = 0;
-    for (std::size_t b = 0; b < list.size(); ++b) {
-      const auto& block = list[pick(random)];
-      total += block.first;
-      count += block.second;
-    }
-    const double value = 0.5 * std::log(total / count);
-    sum += value;
-    squares += value * value;
-  }
-  const double n = static_cast<double>(list.size());
-  // The bootstrap's variance of a mean is short by (n − 1)/n.
-  // Of one block nothing is known of how blocks differ: what is left is the least, below.
-  const double variance =
-      n < 2 ? 0 : std::max(0.0, squares / kResamples - sum * sum / kResamples / kResamples) * n / (n - 1);
+  // How a few sealed blocks differ says little of how blocks do, so the open ones count as well, but for no
+  // more than the sealed ones do: these may lie where something else is at work.
+  constexpr double kFewest = 3;
+  const double of_sealed = static_cast<double>(blocks.size()) - 1;
+  const double of_open =
+      std::min(std::max(0.0, static_cast<double>(others.size()) - 1), std::max(of_sealed, kFewest));
+  const double dof = of_sealed + of_open;
+  double variance = 0;
+  if (dof > 0)
+    variance = (of_sealed * variance_of_log_rms(blocks, blocks.size(), random) +
+                of_open * variance_of_log_rms(others, blocks.size(), random)) /
+               dof;
   // Runs scatter within blocks too: no estimate from N errors is better than 1/(2N) of its square.
-  const double least = 1 / (2.0 * static_cast<double>(errors.count()));
-  const double half = student_t_quantile(0.975, std::max(n - 1, 3.0)) * std::sqrt(std::max(variance, least));
-  estimate.held_out_low = estimate.held_out_rmse * std::exp(-half);
-  estimate.held_out_high = estimate.held_out_rmse * std::exp(half);
+  variance = std::max(variance, 1 / (2 * count));
+  const double t = student_t_quantile(0.975, std::max(dof, kFewest));
+  const double half = t * std::sqrt(variance);
+  // The logarithm of χ² is skewed: few blocks are more often too calm than too wild. The first terms of
+  // Cornish & Fisher (1938) for its mean, −v/2, and its third moment, −v², of ln rms² with variance v.
+  const double up = std::min(variance * (t * t + 2) / 3, half / 2);
+  estimate.held_out_low = estimate.held_out_rmse * std::exp(up - half);
+  estimate.held_out_high = estimate.held_out_rmse * std::exp(up + half);
 }
 
 std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observations& observations,

@@ -74,9 +74,11 @@ std::vector<int> astride_of_steps(const MeanModel& model, const Seal& seal);
 
 // --- estimates.cpp
 
-/// Interval of a root mean square whose blocks are resampled; Student's t for their number, on the logarithm.
-void set_interval(const Observations& observations, const HeldOutErrors& errors, std::uint64_t seed,
-                  ErrorEstimate& estimate);
+/// Root mean square of the sealed runs and its 95 % interval: blocks are resampled, Student's t for their
+/// number, on the logarithm. `open`: errors of the open blocks, each predicted from the others, which say how
+/// blocks differ as well; empty where there are none.
+void set_interval(const Observations& observations, const HeldOutErrors& sealed, const HeldOutErrors& open,
+                  std::uint64_t seed, ErrorEstimate& estimate);
 
 /// Jackknife over blocks: value and 95 % interval of every parameter of every term.
 std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observations& observations,

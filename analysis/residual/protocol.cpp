@@ -65,6 +65,13 @@ HeldOutErrors score(const Observations& observations, const JointFit& fit, const
   return predict_held_out(observations, y, fit.linear.columns, variances, fit_rows, test_rows);
 }
 
+/// Errors of the fitted runs, each block predicted from the others.
+HeldOutErrors left_out(const Observations& observations, const JointFit& fit, const NullFit& variances,
+                       const std::vector<int>& rows) {
+  const Components y = difference(response_components(observations), fit.linear.offset);
+  return cross_validate(observations, y, fit.linear.columns, variances, rows).all();
+}
+
 /// The named terms as they were found beside the curves: fitted without them, they would take up what the
 /// curves describe.
 JointFit without_curves(const Attribution& found, const std::vector<int>& rows) {
@@ -100,11 +107,10 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
                        .whitened = {},
                        .amplitude = {}};
   if (observations.blocks() > 1) {
-    const HeldOutErrors left_out =
-        cross_validate(observations, response_components(observations), {}, fit.variances, rows).all();
-    if (left_out.count() > 0) errors = left_out;
+    const HeldOutErrors predicted = left_out(observations, fit, fit.variances, rows);
+    if (predicted.count() > 0) errors = predicted;
   }
-  set_interval(observations, errors, settings.seed, explanation.before);
+  set_interval(observations, errors, {}, settings.seed, explanation.before);
   explanation.after = explanation.before;
   explanation.detectable =
       scale_of(observations) *
@@ -236,8 +242,12 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
     throw InputError(
         "no row that is held out can be scored: each stands alone in a group that has no other rows; "
         "hold out others");
-  set_interval(alone, before, settings.seed, explanation.before);
-  set_interval(alone, after, settings.seed, explanation.after);
+  const auto with_interval = [&](const HeldOutErrors& sealed, const Observations& data, const JointFit& fit,
+                                 const NullFit& variances, ErrorEstimate& estimate) {
+    set_interval(alone, sealed, left_out(data, fit, variances, seal.open), settings.seed, estimate);
+  };
+  with_interval(before, alone, found.baseline, named.variances, explanation.before);
+  with_interval(after, wide, shown, shown.variances, explanation.after);
   const bool all_shown = settings.empirical || found.curves.empty();
   const HeldOutErrors whole =
       all_shown ? after : score(wide, found.final, found.final.variances, seal.open, scored);
@@ -253,7 +263,8 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
                         .against_adopted = speak_against(after, before)};
   explanation.noise_floor = rms(whole.expected_std);
   ErrorEstimate all = explanation.after;
-  if (!all_shown) set_interval(alone, whole, settings.seed, all);  // with the curves, whose structure is said
+  if (!all_shown)  // with the curves, whose structure is said
+    with_interval(whole, wide, found.final, found.final.variances, all);
   explanation.sealed.beyond_floor = is_beyond_floor(alone, all, explanation.noise_floor, scored);
   explanation.before.rmse = rms(residuals(alone, found.baseline, seal.open));
   explanation.after.rmse = rms(residuals(wide, shown, seal.open));

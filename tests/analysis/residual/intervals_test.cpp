@@ -17,23 +17,28 @@ struct Intervals : testing::Test {
   std::mt19937_64 random{test::seed()};
   double normal(double sigma) { return std::normal_distribution<double>(0, sigma)(random); }
 
-  /// How often the interval of a held-out error holds its true value √(1 + session²), of blocks of six runs.
-  double coverage_of_error(int blocks, double session) {
+  /// How often the interval of a held-out error holds its true value √(1 + session²), of blocks of six runs:
+  /// `sealed` blocks, with `open` others beside them. `heavy`: Student's t of four degrees of freedom.
+  double coverage_of_error(int sealed, int open, double session, bool heavy = false) {
     constexpr int kSamples = 600, kRuns = 6;
-    const Observations o = test::simulate(
-        {.runs_of_block = std::vector<int>(static_cast<std::size_t>(blocks), kRuns), .groups = 1}, random);
+    const std::vector<int> blocks(static_cast<std::size_t>(sealed + open), kRuns);
+    const Observations o = test::simulate({.runs_of_block = blocks, .groups = 1}, random);
+    std::student_t_distribution<double> tails(4);
     int held = 0;
     for (int i = 0; i < kSamples; ++i) {
-      HeldOutErrors errors{.rows = o.all_rows(),
-                           .error = Eigen::MatrixXd(o.rows(), 1),
-                           .expected_std = {},
-                           .whitened = {},
-                           .amplitude = {}};
-      for (Eigen::Index run = 0; run < o.rows(); ++run)
-        errors.error(run, 0) = run % kRuns == 0 ? normal(session) : errors.error(run - 1, 0);
-      for (Eigen::Index run = 0; run < o.rows(); ++run) errors.error(run, 0) += normal(1);
+      HeldOutErrors of_sealed, of_open;
+      for (const int row : o.all_rows())
+        (o.block[static_cast<std::size_t>(row)] < sealed ? of_sealed : of_open).rows.push_back(row);
+      for (HeldOutErrors* part : {&of_sealed, &of_open}) {
+        part->error.resize(static_cast<Eigen::Index>(part->rows.size()), 1);
+        double offset = 0;
+        for (Eigen::Index run = 0; run < part->error.rows(); ++run) {
+          if (run % kRuns == 0) offset = normal(session);
+          part->error(run, 0) = offset + (heavy ? tails(random) / std::sqrt(2.0) : normal(1));
+        }
+      }
       ErrorEstimate estimate;
-      set_interval(o, errors, static_cast<std::uint64_t>(i), estimate);
+      set_interval(o, of_sealed, of_open, static_cast<std::uint64_t>(i), estimate);
       const double truth = std::hypot(1, session);
       held += estimate.held_out_low <= truth && truth <= estimate.held_out_high ? 1 : 0;
     }
@@ -57,10 +62,21 @@ struct Intervals : testing::Test {
 };
 
 TEST_F(Intervals, OfAHeldOutErrorHoldIt) {
-  for (const int blocks : {1, 2, 4, 12}) EXPECT_GT(coverage_of_error(blocks, 0), 0.93) << blocks << " blocks";
-  EXPECT_LT(coverage_of_error(40, 0), 0.99) << "wider than needed";
+  for (const int blocks : {1, 2, 4, 12})
+    EXPECT_GT(coverage_of_error(blocks, 0, 0), 0.93) << blocks << " blocks";
+  EXPECT_LT(coverage_of_error(40, 0, 0), 0.99) << "wider than needed";
   for (const int blocks : {4, 12})
-    EXPECT_GT(coverage_of_error(blocks, 1), 0.88) << blocks << " blocks that differ";
+    EXPECT_GT(coverage_of_error(blocks, 0, 1), 0.88) << blocks << " blocks that differ";
+}
+
+TEST_F(Intervals, OfAHeldOutErrorLearnFromTheOpenBlocks) {
+  EXPECT_GT(coverage_of_error(1, 8, 1.2), 0.92);
+  for (const double session : {1.2, 3.0})
+    for (const bool heavy : {false, true}) {
+      const double coverage = coverage_of_error(5, 13, session, heavy);
+      EXPECT_GT(coverage, 0.91) << session << " " << heavy;
+      EXPECT_LT(coverage, 0.98) << session << " " << heavy;
+    }
 }
 
 TEST_F(Intervals, OfTheMedianOfGroupsHoldIt) {
