@@ -2,6 +2,8 @@
 
 #include "attribution/generator/random.h"
 
+#include <cmath>
+#include <cstdlib>
 #include <map>
 
 #include <Eigen/Cholesky>
@@ -25,6 +27,16 @@ Rotors draw_rotors(double sigma, double common_share, Random& random, const Nois
   return values;
 }
 
+/// Of n runs of one session in order: neighbours persist, and all share the session's offset.
+Eigen::MatrixXd session_covariance(const NoiseModel& model, Eigen::Index n) {
+  Eigen::MatrixXd covariance(n, n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j)
+      covariance(i, j) = model.run * model.run * std::pow(model.persistence, std::abs(i - j)) +
+                         model.session * model.session;
+  return covariance;
+}
+
 /// Mean variance, over the runs of every fourth session, of the coefficient that generalised least squares
 /// finds from the other sessions. A location that is not among those counts for nothing.
 double coefficient_variance(const NoiseModel& model, const World& world, int first_sealed) {
@@ -39,14 +51,11 @@ double coefficient_variance(const NoiseModel& model, const World& world, int fir
   const auto size = static_cast<Eigen::Index>(index.size());
   if (size == 0) return 0;
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(size, size);
-  const double run = model.run * model.run, session = model.session * model.session;
   for (const auto& [id, places] : sessions) {
-    Eigen::VectorXd counts = Eigen::VectorXd::Zero(size);
-    for (const Eigen::Index place : places) counts[place] += 1;
-    // Woodbury: the inverse of run I + session 1 1'
-    const double shared = session / (run * (run + static_cast<double>(places.size()) * session));
-    information.diagonal() += counts / run;
-    information -= shared * counts * counts.transpose();
+    const auto runs = static_cast<Eigen::Index>(places.size());
+    Eigen::MatrixXd of_place = Eigen::MatrixXd::Zero(runs, size);
+    for (Eigen::Index i = 0; i < runs; ++i) of_place(i, places[static_cast<std::size_t>(i)]) = 1;
+    information += of_place.transpose() * session_covariance(model, runs).ldlt().solve(of_place);
   }
   const Eigen::MatrixXd covariance = information.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
   double sum = 0;
