@@ -76,20 +76,29 @@ std::string why_not(const CampaignData& data, const Run& run, const RawRun& raw)
 
 }  // namespace
 
+std::vector<std::size_t> tare_runs(const CampaignData& data) {
+  std::vector<std::size_t> tares;
+  for (std::size_t r = 0; r < data.runs.size(); ++r) {
+    const Run& run = data.runs[r];
+    const auto raw = data.raw.find(run.run);
+    if (run.kind == RunKind::kTare && run.excluded.empty() && data.statistics.contains(run.run) &&
+        raw != data.raw.end() && raw->second.state == RunState::kComplete)
+      tares.push_back(r);
+  }
+  return tares;
+}
+
 Tares tares_of(const CampaignData& data) {
   std::vector<TareReading> readings;
-  for (const Run& run : data.runs) {
-    const auto statistics = data.statistics.find(run.run);
-    const auto raw = data.raw.find(run.run);
-    if (run.kind != RunKind::kTare || !run.excluded.empty() || statistics == data.statistics.end() ||
-        raw == data.raw.end())
-      continue;
-    if (raw->second.state != RunState::kComplete) continue;
-    const double half_s = 0.5 * static_cast<double>(raw->second.frames) / data.info.daq.sample_rate_hz;
+  for (const std::size_t r : tare_runs(data)) {
+    const Run& run = data.runs[r];
+    const std::vector<ChannelStatistics>& channels = data.statistics.at(run.run).channels;
+    const double half_s =
+        0.5 * static_cast<double>(data.raw.at(run.run).frames) / data.info.daq.sample_rate_hz;
     TareReading reading{.session = run.session, .time_s = run.start_s + half_s};
-    for (std::size_t c = 0; c < std::min<std::size_t>(statistics->second.channels.size(), kMaxRotors); ++c) {
-      reading.mean_V[c] = statistics->second.channels[c].mean_V;
-      reading.standard_error_V[c] = statistics->second.channels[c].standard_error_V;
+    for (std::size_t c = 0; c < std::min<std::size_t>(channels.size(), kMaxRotors); ++c) {
+      reading.mean_V[c] = channels[c].mean_V;
+      reading.standard_error_V[c] = channels[c].standard_error_V;
     }
     readings.push_back(reading);
   }

@@ -83,7 +83,10 @@ struct Reduction {
 /// be, where raw runs have no calibration, and where a switched-on term lacks its measurement in some run.
 Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms);
 
-/// The tares of all sessions: complete runs with motors stopped, each at its middle.
+/// Indices in CampaignData::runs of what serves as tares: complete runs with motors stopped.
+std::vector<std::size_t> tare_runs(const CampaignData& data);
+
+/// Their readings in the same order, each at its middle.
 Tares tares_of(const CampaignData& data);
 
 /// Total, C_T and U with their errors, from the thrusts.

@@ -7,7 +7,7 @@ namespace {
 struct CableForce {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
-    return force + p[0] * s.x[0];
+    return force + p[0] * since_zero(s, 0, 0);
   }
 };
 
@@ -23,6 +23,7 @@ std::vector<Effect> cable_force() {
       .covariates = {"cable_force_N"},
       .scope = EffectScope::kRotor,
       .additive = true,
+      .of_zero = true,
       .sign_rule = "either",
       .force_N = {},
       .jet_N = {},

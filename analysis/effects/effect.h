@@ -22,13 +22,21 @@ using EffectJet = ceres::Jet<double, kMaxEffectParameters>;
 struct Sample {
   std::span<const double> x;          // the effect's covariates, in the order in which it names them
   std::span<const double> reference;  // their typical values in the campaign (medians; kept when adopted)
+  std::span<const double> at_zero;    // what they were at the tares that the run's zero is of; empty: no tare
   double time_s = 0;                  // since the run's first frame
   double previous_N = 0;  // predicted force of the run before, same rotor and session; NaN for the first
   double previous_error_N = 0;  // standard error of its difference from this run's, as far as it is known
   double other_N = 0;           // predicted force of the rotor that leaks into this one (crosstalk)
   double newtons_per_volt = 1;  // of the cell; 1 where the campaign gives forces
+  double radius_m = 0;          // of this propeller: in a table rows may have propellers of any size
   const Rig* rig = nullptr;
 };
+
+/// Of what the zero of a cell does, as far as tares have not taken it off: covariate k of the sample, less
+/// what it was at the tares; without tares less `otherwise`.
+inline double since_zero(const Sample& s, std::size_t k, double otherwise) {
+  return s.x[k] - (s.at_zero.empty() ? otherwise : s.at_zero[k]);
+}
 
 /// A parameter's role decides how it is found.
 enum class ParameterRole {
@@ -63,6 +71,7 @@ struct Effect {
   bool tunnel_only = false;  // acts at tunnel locations only
   bool theory_only = false;  // the amplitude is theory's whenever the effect is adopted
   bool additive = false;     // adds a force, where others scale it
+  bool of_zero = false;      // is in the tares as well, which take it off
   bool needs_previous = false;
   std::string sign_rule;  // what the bounds of the amplitude mean, in words
 

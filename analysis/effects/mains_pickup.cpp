@@ -7,7 +7,7 @@ namespace {
 struct MainsPickup {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
-    return force + p[0] * (s.newtons_per_volt * s.x[0]);
+    return force + p[0] * (s.newtons_per_volt * since_zero(s, 0, 0));
   }
 };
 
@@ -24,6 +24,7 @@ std::vector<Effect> mains_pickup() {
       .covariates = {"mains_amplitude_V"},
       .scope = EffectScope::kRotor,
       .additive = true,
+      .of_zero = true,
       .sign_rule = "either",
       .force_N = {},
       .jet_N = {},

@@ -7,7 +7,10 @@ namespace {
 struct MountingStep {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
-    return s.x[0] < p[1] ? force : force + p[0] * s.newtons_per_volt;
+    const bool after = !(s.x[0] < p[1]);
+    const bool tared_after = !s.at_zero.empty() && !(s.at_zero[0] < p[1]);
+    if (after == tared_after) return force;
+    return force + p[0] * (after ? s.newtons_per_volt : -s.newtons_per_volt);
   }
 };
 
@@ -23,6 +26,7 @@ std::vector<Effect> mounting_step() {
       .covariates = {"run_order"},
       .scope = EffectScope::kRotor,
       .additive = true,
+      .of_zero = true,
       .sign_rule = "either",
       .force_N = {},
       .jet_N = {},

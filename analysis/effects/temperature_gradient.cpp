@@ -7,7 +7,7 @@ namespace {
 struct TemperatureGradient {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
-    return force + p[0] * (s.newtons_per_volt * (s.x[0] - s.x[1]));
+    return force + p[0] * (s.newtons_per_volt * (since_zero(s, 0, 0) - since_zero(s, 1, 0)));
   }
 };
 
@@ -23,6 +23,7 @@ std::vector<Effect> temperature_gradient() {
       .covariates = {"cell_temperature_C", "air_temperature_C"},
       .scope = EffectScope::kRotor,
       .additive = true,
+      .of_zero = true,
       .sign_rule = "either",
       .force_N = {},
       .jet_N = {},

@@ -9,8 +9,8 @@
 namespace tunnelrig::effects {
 namespace {
 
-double compressibility(std::span<const double> x, const Rig& rig) {
-  const double tip_m_s = x[0] * 2 * std::numbers::pi / 60 * rig.propeller_radius_m;
+double compressibility(std::span<const double> x, double radius_m) {
+  const double tip_m_s = x[0] * 2 * std::numbers::pi / 60 * radius_m;
   const double mach = std::min(tip_m_s / speed_of_sound_m_s(x[1] + kZeroCelsius_K), 0.99);
   return 1 - mach * mach;
 }
@@ -19,7 +19,8 @@ struct TipMach {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
     using std::pow;
-    const double ratio = compressibility(s.x, *s.rig) / compressibility(s.reference, *s.rig);
+    const double ratio =
+        compressibility(s.x, s.radius_m) / compressibility(s.reference, s.rig->propeller_radius_m);
     return force * pow(T(ratio), -p[0]);
   }
 };

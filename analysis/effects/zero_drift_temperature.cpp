@@ -7,7 +7,7 @@ namespace {
 struct ZeroDriftTemperature {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
-    return force + p[0] * (s.newtons_per_volt * (s.x[0] - s.reference[0]));
+    return force + p[0] * (s.newtons_per_volt * since_zero(s, 0, s.reference[0]));
   }
 };
 
@@ -23,6 +23,7 @@ std::vector<Effect> zero_drift_temperature() {
               .covariates = {"cell_temperature_C"},
               .scope = EffectScope::kRotor,
               .additive = true,
+              .of_zero = true,
               .sign_rule = "either",
               .force_N = {},
               .jet_N = {},
@@ -36,6 +37,7 @@ std::vector<Effect> zero_drift_temperature() {
               .covariates = {"air_temperature_C"},
               .scope = EffectScope::kRotor,
               .additive = true,
+              .of_zero = true,
               .sign_rule = "either",
               .force_N = {},
               .jet_N = {},

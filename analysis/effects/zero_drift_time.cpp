@@ -7,7 +7,7 @@ namespace {
 struct ZeroDriftTime {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
-    return force + p[0] * (s.newtons_per_volt * s.x[0]);
+    return force + p[0] * (s.newtons_per_volt * since_zero(s, 0, 0));
   }
 };
 
@@ -23,6 +23,7 @@ std::vector<Effect> zero_drift_time() {
       .covariates = {"hours_in_session"},
       .scope = EffectScope::kRotor,
       .additive = true,
+      .of_zero = true,
       .sign_rule = "either",
       .force_N = {},
       .jet_N = {},

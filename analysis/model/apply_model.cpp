@@ -151,12 +151,16 @@ class Forward {
     const ModelTerm& term = model_.terms[t];
     std::vector<double> x;
     for (const Covariate* covariate : term_covariates_[t]) x.push_back(covariate->at(row, channel));
+    const std::vector<double> zero =
+        term.effect->of_zero ? at_zero(term_covariates_[t], row, channel) : std::vector<double>();
     Sample sample{.x = x,
                   .reference = term.reference,
+                  .at_zero = zero,
                   .previous_N = term.effect->needs_previous ? previous_->force_N(row, channel) : kNaN,
                   .previous_error_N = term.effect->needs_previous ? previous_->error_N(row, channel) : 0,
                   .other_N = term.other < 0 ? 0 : forces_N(term.other),
                   .newtons_per_volt = observations_.newtons_per_volt(channel),
+                  .radius_m = observations_.rig.propeller_radius_m,
                   .rig = &observations_.rig};
     const double* p = parameters.data() + first_[t];
     const double duration_s = observations_.duration_s(row);

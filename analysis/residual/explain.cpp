@@ -54,21 +54,20 @@ std::vector<SuspectRow> rows_of(const std::vector<IsolatedValue>& values) {
 }
 
 /// A campaign's runs are many, and its conditions are typed by hand: one that is a slip goes with its run.
-std::vector<std::string> without_mistyped(SetAside& aside) {
-  std::vector<std::string> said;
+void set_mistyped_aside(SetAside& aside, std::vector<std::string>& said) {
   const std::vector<IsolatedValue> values = mistyped_values(aside.kept);
   const std::vector<SuspectRow> rows = rows_of(values);
   const bool few = rows.size() <= aside.room();
   if (few) aside.take(rows);
   for (const IsolatedValue& value : values)
     said.push_back(in_words(value, few ? "set aside; a typing error?" : "a typing error?"));
-  return said;
 }
 
 /// A condition far from all others is said. Where the model found with such rows predicts worse than none, it
 /// is found without them.
 Explanation without_isolated(Explanation explanation, SetAside& aside,
-                             const std::vector<const Effect*>& effects, const SearchSettings& settings) {
+                             const std::vector<const Effect*>& effects, const SearchSettings& settings,
+                             std::vector<std::string>& said) {
   const std::vector<IsolatedValue> isolated = isolated_values(aside.kept);
   if (isolated.empty()) return explanation;
   const bool misled = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
@@ -79,9 +78,9 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
     explanation = explain_once(aside.kept, effects, settings);
   }
   for (const IsolatedValue& value : isolated)
-    explanation.warnings.push_back(
-        in_words(value, aside_too ? "set aside, since the model found with it predicted worse than none"
-                                  : "a typing error?"));
+    said.push_back(in_words(value, aside_too
+                                       ? "set aside, since the model found with it predicted worse than none"
+                                       : "a typing error?"));
   return explanation;
 }
 
@@ -136,14 +135,17 @@ std::string taken_back_all(const Explanation& explanation) {
 }
 
 /// Once more without the names that are refuted: what they did may be structure whose cause is not known.
-/// Where the names predict the sealed blocks, and what is found without them does not, they stay.
+/// Where the names predict the sealed blocks, and what is found without them does not, they stay. What may
+/// not be found any more is out of `effects` and `settings` then.
 Explanation without_refuted(Explanation explanation, const Observations& observations,
-                            std::vector<const Effect*> effects, SearchSettings settings) {
-  std::vector<std::string> said;
+                            std::vector<const Effect*>& effects, SearchSettings& settings,
+                            std::vector<std::string>& said) {
   for (Refuted found = refuted(explanation); found.any(); found = refuted(explanation)) {
-    settings.taken_back.insert(settings.taken_back.end(), found.terms.begin(), found.terms.end());
-    if (found.all) std::erase_if(effects, [](const Effect* effect) { return !effect->theory_only; });
-    Explanation without = explain_once(observations, effects, settings);
+    std::vector<const Effect*> fewer = effects;
+    SearchSettings stricter = settings;
+    stricter.taken_back.insert(stricter.taken_back.end(), found.terms.begin(), found.terms.end());
+    if (found.all) std::erase_if(fewer, [](const Effect* effect) { return !effect->theory_only; });
+    Explanation without = explain_once(observations, fewer, stricter);
     without.untestable = explanation.untestable;
     const bool stay = worse(explanation.sealed.curves, explanation.sealed.all) &&
                       worse(without.sealed.names, explanation.sealed.all);
@@ -156,8 +158,9 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
           found.why[k]);
     if (stay) break;
     explanation = std::move(without);
+    effects = std::move(fewer);
+    settings = std::move(stricter);
   }
-  explanation.warnings.insert(explanation.warnings.end(), said.begin(), said.end());
   return explanation;
 }
 
@@ -176,14 +179,15 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
                     const SearchSettings& settings) {
   // A gross error hides what else is there: it is set aside, and said.
   SetAside aside(observations);
+  std::vector<std::string> said;
   while (const auto row = gross_row(aside.kept)) {
     if (aside.room() == 0) break;
     aside.take({*row});
   }
-  const std::vector<std::string> mistyped =
-      observations.from_table ? std::vector<std::string>() : without_mistyped(aside);
-  if (!observations.from_table)
+  if (!observations.from_table) {
+    set_mistyped_aside(aside, said);
     if (const auto wild = wild_runs(aside.kept); wild.size() <= aside.room()) aside.take(wild);
+  }
   Explanation explanation = explain_once(aside.kept, effects, settings);
   for (int again = 0; again < kMostSearches; ++again) {
     const std::vector<SuspectRow> gross = gross_rows(aside.kept, explanation.suspect_rows);
@@ -192,10 +196,12 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
     explanation = explain_once(aside.kept, effects, settings);
   }
   if (observations.from_table)
-    explanation = without_isolated(std::move(explanation), aside, effects, settings);
-  explanation = without_refuted(std::move(explanation), aside.kept, effects, settings);
-  explanation = without_names_of_incomplete(std::move(explanation), aside.kept, effects, settings);
-  explanation.warnings.insert(explanation.warnings.begin(), mistyped.begin(), mistyped.end());
+    explanation = without_isolated(std::move(explanation), aside, effects, settings, said);
+  std::vector<const Effect*> left = effects;
+  SearchSettings unrefuted = settings;
+  explanation = without_refuted(std::move(explanation), aside.kept, left, unrefuted, said);
+  explanation = without_names_of_incomplete(std::move(explanation), aside.kept, left, unrefuted, said);
+  explanation.warnings.insert(explanation.warnings.begin(), said.begin(), said.end());
   explanation.suspect_rows.insert(explanation.suspect_rows.begin(), aside.rows.begin(), aside.rows.end());
   return explanation;
 }

@@ -51,10 +51,10 @@ void warn_of_alike_rows(const Observations& observations, Explanation& explanati
 
 /// Holds what was found against the runs that have all conditions of which some runs lack a value. Where
 /// these say that it is the work of such a condition, names that they do not confirm are taken back, and it
-/// is said.
+/// is `said`.
 Explanation without_names_of_incomplete(Explanation explanation, const Observations& observations,
                                         const std::vector<const Effect*>& effects,
-                                        const SearchSettings& settings);
+                                        const SearchSettings& settings, std::vector<std::string>& said);
 
 // --- change_points.cpp
 

@@ -3,7 +3,6 @@
 #include "analysis/residual/explanation_parts.h"
 
 #include <algorithm>
-#include <set>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -25,18 +24,14 @@ std::vector<std::string> nearly_complete(const Observations& observations) {
   return names;
 }
 
-/// The runs that have all of them, in which they are candidates. Nothing where a block has none left.
+/// The runs that have all of them, in which they are candidates.
 Observations with_all(const Observations& observations, const std::vector<std::string>& names) {
   std::vector<int> rows;
-  std::set<int> blocks;
-  for (const int row : observations.all_rows()) {
-    const bool has_all = std::ranges::all_of(
-        names, [&](const std::string& name) { return observations.find(name)->value.row(row).allFinite(); });
-    if (!has_all) continue;
-    rows.push_back(row);
-    blocks.insert(observations.block[static_cast<std::size_t>(row)]);
-  }
-  if (static_cast<int>(blocks.size()) < observations.blocks()) rows.clear();
+  for (const int row : observations.all_rows())
+    if (std::ranges::all_of(names, [&](const std::string& name) {
+          return observations.find(name)->value.row(row).allFinite();
+        }))
+      rows.push_back(row);
   Observations complete = observations.subset(rows);
   for (const std::string& name : names) complete.not_usable.erase(name);
   return complete;
@@ -63,7 +58,7 @@ std::vector<std::string> found_with(const Explanation& explanation, const std::v
 
 Explanation without_names_of_incomplete(Explanation explanation, const Observations& observations,
                                         const std::vector<const Effect*>& effects,
-                                        const SearchSettings& settings) {
+                                        const SearchSettings& settings, std::vector<std::string>& said) {
   const std::vector<std::string> incomplete = nearly_complete(observations);
   if (incomplete.empty() || (explanation.adopted.empty() && explanation.unknown.empty())) return explanation;
   const Observations complete = with_all(observations, incomplete);
@@ -88,13 +83,12 @@ Explanation without_names_of_incomplete(Explanation explanation, const Observati
     again.untestable = std::move(explanation.untestable);
     explanation = std::move(again);
   }
-  explanation.warnings.push_back(fmt::format(
-      "in the {} of {} {} that have {}, {} is found{}: fill in what is missing", complete.rows(),
-      observations.rows(), observations.from_table ? "rows" : "runs", fmt::join(incomplete, " and "),
-      fmt::join(found, " and "),
-      gone.empty()
-          ? ""
-          : fmt::format(", and {} is not, which is taken back therefore", fmt::join(gone, " and "))));
+  said.push_back(fmt::format("in the {} of {} {} that have {}, {} is found{}: fill in what is missing",
+                             complete.rows(), observations.rows(), observations.from_table ? "rows" : "runs",
+                             fmt::join(incomplete, " and "), fmt::join(found, " and "),
+                             gone.empty() ? ""
+                                          : fmt::format(", and {} is not, which is taken back therefore",
+                                                        fmt::join(gone, " and "))));
   return explanation;
 }
 

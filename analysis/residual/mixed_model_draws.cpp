@@ -57,7 +57,8 @@ std::vector<MatrixXd> MixedModel::sizes_left(const std::vector<std::size_t>& rat
   std::vector<MatrixXd> result(strata_.size());
   for (std::size_t s = 0; s < strata_.size(); ++s) {
     if (!strata_[s].means()) continue;
-    Stacked left = stack(s, {&residual}), alike = simulate_unit(s, ratio[s], kSets, 0, random);
+    Stacked left = stack(s, {&residual}),
+            alike = simulate_unit(s, ratio[s], kSets, run_correlation(s), random);
     project(s, ratio[s], left);
     project(s, ratio[s], alike);
     Eigen::VectorXd own = alike.array().square().rowwise().mean();  // 1 − h

@@ -1,6 +1,8 @@
 #include "analysis/residual/observations.h"
 
+#include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace tunnelrig {
 namespace {
@@ -11,6 +13,19 @@ std::vector<T> picked(const std::vector<T>& from, const std::vector<int>& rows) 
   if (from.empty()) return result;
   for (const int row : rows) result.push_back(from[static_cast<std::size_t>(row)]);
   return result;
+}
+
+/// Numbers without gaps, in the same order, and the names that they have.
+void close_gaps(std::vector<int>& number, std::vector<std::string>& name) {
+  std::map<int, int> closed;
+  for (const int old : number) closed[old] = 0;
+  std::vector<std::string> names;
+  for (auto& [old, fresh] : closed) {
+    fresh = static_cast<int>(names.size());
+    names.push_back(name[static_cast<std::size_t>(old)]);
+  }
+  for (int& each : number) each = closed.at(each);
+  name = std::move(names);
 }
 
 }  // namespace
@@ -52,6 +67,16 @@ Covariate covariate_of_texts(const std::string& name, const std::vector<std::str
   return covariate;
 }
 
+std::vector<double> at_zero(const std::vector<const Covariate*>& covariates, Eigen::Index run,
+                            Eigen::Index channel) {
+  std::vector<double> result;
+  for (const Covariate* covariate : covariates) {
+    if (covariate->at_zero.size() == 0 || std::isnan(covariate->zero(run, channel))) return {};
+    result.push_back(covariate->zero(run, channel));
+  }
+  return result;
+}
+
 std::vector<int> Observations::all_rows() const {
   std::vector<int> all(static_cast<std::size_t>(rows()));
   std::iota(all.begin(), all.end(), 0);
@@ -81,11 +106,16 @@ Observations Observations::subset(const std::vector<int>& kept) const {
   part.scatter = scatter.subset(kept);
   for (Place& place : part.places) place.weight = Eigen::VectorXd(place.weight(kept));
   part.duration_s = Eigen::VectorXd(duration_s(kept));
-  for (Covariate& covariate : part.covariates)
+  for (Covariate& covariate : part.covariates) {
     covariate.value = Eigen::MatrixXd(covariate.value(kept, Eigen::all));
+    if (covariate.at_zero.size() > 0)
+      covariate.at_zero = Eigen::MatrixXd(covariate.at_zero(kept, Eigen::all));
+  }
   part.name = picked(name, kept);
   part.group = picked(group, kept);
   part.block = picked(block, kept);
+  close_gaps(part.group, part.group_name);
+  close_gaps(part.block, part.block_name);
   part.in_tunnel = picked(in_tunnel, kept);
   part.previous = picked(previous, kept);
   std::vector<int> place(static_cast<std::size_t>(rows()), -1);
@@ -94,6 +124,7 @@ Observations Observations::subset(const std::vector<int>& kept) const {
   for (int& before : part.previous)
     if (before >= 0) before = place[static_cast<std::size_t>(before)];
   part.held_out = picked(held_out, kept);
+  if (position.size() > 0) part.position = Eigen::VectorXd(position(kept));
   return part;
 }
 

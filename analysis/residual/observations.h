@@ -24,13 +24,25 @@ struct Covariate {
   bool derived = false;                  // made here, not a column of the sheet
   std::string unit = {};                 // empty: the name says it, or it is not known
   std::vector<std::string> labels = {};  // of a column of texts: value i + 1 stands for labels[i]
+  Eigen::MatrixXd at_zero = {};          // as `value`, when the run's zero was taken: NaN where not by tares;
+                                         // empty: by no tares, or it is no condition of a zero
 
   bool per_channel() const { return value.cols() > 1; }
   double at(Eigen::Index run, Eigen::Index channel) const { return value(run, per_channel() ? channel : 0); }
+  double zero(Eigen::Index run, Eigen::Index channel) const {
+    return at_zero(run, per_channel() ? channel : 0);
+  }
 };
 
+/// Conditions of a run when its zero was taken, in the order of these; empty where not by tares, or where one
+/// is no condition of a zero.
+std::vector<double> at_zero(const std::vector<const Covariate*>& covariates, Eigen::Index run,
+                            Eigen::Index channel);
+
 inline constexpr std::string_view kGroundDistance = "ground_distance_R",
-                                  kCeilingDistance = "ceiling_distance_R";
+                                  kCeilingDistance = "ceiling_distance_R",
+                                  kDiameter = "propeller_diameter_m";  // of a table's propellers
+inline constexpr const char* kConstantBaseline = "constant";  // a table's, where nothing else is said
 
 /// A place without ground or ceiling has no distance to it, and what depends on the distance is absent there.
 inline bool may_be_absent(std::string_view covariate) {
@@ -148,7 +160,7 @@ struct Observations {
     return nullptr;
   }
 
-  /// The same of some rows only. Groups and blocks keep their numbers.
+  /// The same of some rows only. Groups and blocks without a row are gone; the others keep their order.
   Observations subset(const std::vector<int>& kept) const;
 };
 

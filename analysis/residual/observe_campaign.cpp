@@ -1,8 +1,7 @@
 #include "analysis/conventions.h"
 #include "analysis/reduction.h"
-#include "analysis/residual/observations.h"
+#include "analysis/residual/campaign_conditions.h"
 #include "datasets/error.h"
-#include "datasets/locations.h"
 
 #include <algorithm>
 #include <cmath>
@@ -82,15 +81,6 @@ void add_courses(const Source& source, Observations& result) {
   }
 }
 
-/// A condition of a run; distances to ground and ceiling, if no column says them, by the label (GND1.25).
-std::optional<double> condition(const Run& run, const std::string& name) {
-  const auto value = run.number(name);
-  if (value) return value;
-  if (name == kGroundDistance) return distance_of(run.location, "GND");
-  if (name == kCeilingDistance) return distance_of(run.location, "CEIL");
-  return {};
-}
-
 void add_sheet_covariates(const Source& source, Observations& result) {
   static const std::set<std::string, std::less<>> kNotConditions = {
       "repeat", "thrust_1_N", "thrust_2_N", "thrust_3_N", "thrust_4_N", "y_norm", "z_norm"};
@@ -154,7 +144,8 @@ void add_raw_covariates(const Source& source, Observations& result) {
   add("clip_fraction", [](const RunStatistics& run, const ChannelStatistics& channel) {
     return static_cast<double>(channel.clipped) / static_cast<double>(run.frames);
   });
-  add("mains_amplitude_V", lines([](std::string_view name) { return name.starts_with("mains"); }));
+  add("mains_amplitude_V",
+      [](const RunStatistics&, const ChannelStatistics& channel) { return mains_amplitude_V(channel); });
   add("alias_amplitude_V", lines([](std::string_view name) { return name.find("alias") != name.npos; }));
   add("vibration_amplitude_V",
       lines([](std::string_view name) { return name == "shaft" || name == "blade_pass"; }));
@@ -202,9 +193,10 @@ void add_derived_covariates(const Source& source, Observations& result) {
 
 /// Open space has one coefficient for all heights where the baseline says so.
 std::string group_of(const Run& run, const std::string& baseline) {
-  const bool open = run.location == "OS" || run.location.starts_with("GND") ||
-                    run.location.starts_with("CEIL") || run.number("ground_distance_R") ||
-                    run.number("ceiling_distance_R");
+  const bool open =
+      !run.in_tunnel() &&
+      (run.location == "OS" || run.location.starts_with("GND") || run.location.starts_with("CEIL") ||
+       run.number(std::string(kGroundDistance)) || run.number(std::string(kCeilingDistance)));
   return baseline == "open_space" && open ? kOpenSpace : run.location;
 }
 
@@ -331,6 +323,8 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
       result.newtons_per_volt(c) = 1 / (data.certificate->cells[static_cast<std::size_t>(c)].gain_V_per_N *
                                         data.certificate->propellers.factor(c));
   const Response response = response_of(source, result.response, result.newtons_per_volt);
+  if (result.response != "thrust")
+    result.newtons_per_volt.setOnes();  // volts, and whatever else, as they are
   if (!all_runs) leave_out_against_sign(source, response, result);
   set_response(source, response, result);
   set_belonging(source, result);
@@ -344,6 +338,7 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
   add_texts(source, result);
   add_derived_covariates(source, result);
   add_raw_covariates(source, result);
+  set_conditions_at_zero(data, reduction, source.order, result);
   if (result.response == "thrust" || result.response == "cell") add_courses(source, result);
   return result;
 }

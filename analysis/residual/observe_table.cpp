@@ -46,7 +46,7 @@ void add_covariates(const TableSource& source, Observations& result) {
       add(column.name(), column.kept_unit(), [&](Index r) { return source.converted(r, column); });
   if (schema.diameter_column || schema.diameter_m)
     add(
-        "propeller_diameter_m", "m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); },
+        std::string(kDiameter), "m", [&](Index r) { return source.row(r).diameter_m.value_or(kNaN); },
         !schema.diameter_column);
   if (result.find("air_temperature_C") == nullptr) result.assumed.insert("air_temperature_C");
   add("air_temperature_C", "°C", [&](Index r) { return source.row(r).air_temperature_C; });
@@ -228,8 +228,8 @@ void set_previous(Observations& result) {
 
 /// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
 void set_baseline(const TableSource& source, const ObservationChoice& choice, Observations& result) {
-  result.baseline = choice.baseline.empty() ? "constant" : choice.baseline;
-  if (result.baseline == "constant") return;
+  result.baseline = choice.baseline.empty() ? kConstantBaseline : choice.baseline;
+  if (result.baseline == kConstantBaseline) return;
   const auto colon = result.baseline.find(':');
   const std::string kind = result.baseline.substr(0, colon);
   if ((kind != "linear" && kind != "power") || colon == std::string::npos)
@@ -294,7 +294,7 @@ Observations observe_table(const ObservationTable& table, const ObservationChoic
   result.newtons_per_volt = VectorXd::Ones(1);
   result.rig.rotors = 1;
   result.from_table = true;
-  if (const Covariate* diameter = result.find("propeller_diameter_m"))
+  if (const Covariate* diameter = result.find(kDiameter))
     result.rig.propeller_radius_m = diameter->value.col(0).mean() / 2;
   if (const Covariate* speed = result.find("speed_rpm"))
     result.rig.nominal_speed_rpm = speed->value.col(0).mean();

@@ -20,7 +20,7 @@ struct Search::InGroups {
 /// Only effects that may have either sign: of the others, what all groups have in common is seen first.
 Search::Scan Search::scan_effects_and_groups(const JointFit& base) const {
   Scan scan = list_effects(base);
-  if (observations_.channels() == 1) {
+  if (observations_.from_table) {
     add_group_ways(scan);
     add_several_axes(scan);
   } else {
@@ -92,7 +92,7 @@ void Search::take(InGroups own) {
 }
 
 void Search::let_groups_differ(bool before_others) {
-  if (observations_.channels() > 1 || observations_.groups() < 2 || result_.accepted.empty()) return;
+  if (!observations_.from_table || observations_.groups() < 2 || result_.accepted.empty()) return;
   const Term& newest = result_.accepted.back().term;
   if (newest.per_group || newest.effect->theory_only) return;
   MeanModel others = fit_.model;

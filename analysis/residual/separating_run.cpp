@@ -100,11 +100,10 @@ std::vector<Setting> variations(const Setting& ordinary, const std::vector<const
 
 /// Observations whose runs are the settings; steps that came before the campaign's end have happened.
 Observations imagined(const Observations& observations, const std::vector<Setting>& settings) {
-  Observations result = observations;
   std::vector<int> rows;
   for (const Setting& setting : settings) rows.push_back(setting.like);
-  result.y = MatrixXd(observations.y(rows, Eigen::all));
-  result.duration_s = VectorXd::Zero(static_cast<Index>(rows.size()));
+  Observations result = observations.subset(rows);
+  result.duration_s.setZero();
   result.shape.clear();
   result.previous.assign(rows.size(), -1);
   result.position =
@@ -112,7 +111,7 @@ Observations imagined(const Observations& observations, const std::vector<Settin
   result.in_tunnel.clear();
   for (const Setting& setting : settings) result.in_tunnel.push_back(setting.in_tunnel);
   for (Covariate& covariate : result.covariates) {
-    covariate.value = MatrixXd(covariate.value(rows, Eigen::all));
+    if (covariate.name == "run_order") covariate.at_zero.setConstant(result.position(0));
     for (std::size_t s = 0; s < settings.size(); ++s)
       if (const auto set = settings[s].covariates.find(covariate.name); set != settings[s].covariates.end())
         covariate.value.row(static_cast<Index>(s)).setConstant(set->second);

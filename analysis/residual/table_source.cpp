@@ -68,9 +68,9 @@ constexpr std::size_t kNamedRows = 4;
 
 bool is_thrust_with_speed(const ObservationTable& table, const ObservationChoice& choice) {
   return is_own_response(table.schema, choice) && table.schema.response.meaning == "thrust_N" &&
-         choice.baseline.empty() && std::ranges::any_of(table.rows, [](const Observation& row) {
-           return row.speed_rpm.value_or(0) > 0;
-         });
+         (choice.baseline.empty() || choice.baseline == kConstantBaseline) &&
+         std::ranges::any_of(table.rows,
+                             [](const Observation& row) { return row.speed_rpm.value_or(0) > 0; });
 }
 
 /// Of thrusts without a diameter: whether they have both signs or scatter alike, and most have a speed.

@@ -61,6 +61,7 @@ class Evaluation {
     }
     within_ = term.effect->within_time() && !observations.shape.empty();
     if (term.effect->needs_previous) previous_.emplace(observations, predicted);
+    if (observations.from_table) diameter_ = observations.find(kDiameter);
   }
 
   bool applies(Index row, Index channel) const {
@@ -95,14 +96,18 @@ class Evaluation {
   Sample sample_of(Index row, Index channel) {
     for (std::size_t k = 0; k < covariates_.size(); ++k)
       x_[k] = is_order_[k] ? position(row) : covariates_[k]->at(row, channel);
+    if (term_.effect->of_zero) at_zero_ = at_zero(covariates_, row, channel);
     return {
         .x = x_,
         .reference = reference_,
+        .at_zero = at_zero_,
         .previous_N = previous_ ? previous_->force_N(row, channel) : std::numeric_limits<double>::quiet_NaN(),
         .previous_error_N = previous_ ? previous_->error_N(row, channel) : 0,
         .other_N = term_.other < 0 ? 0 : force_of(row, term_.other),
         .newtons_per_volt =
             channel < observations_.newtons_per_volt.size() ? observations_.newtons_per_volt(channel) : 1,
+        .radius_m =
+            diameter_ != nullptr ? diameter_->value(row, 0) / 2 : observations_.rig.propeller_radius_m,
         .rig = &observations_.rig};
   }
 
@@ -131,9 +136,10 @@ class Evaluation {
   std::vector<double> reference_;
   std::vector<const Covariate*> covariates_;
   std::vector<bool> is_order_;  // of the rows
-  std::vector<double> x_;
+  std::vector<double> x_, at_zero_;
   EffectJet parameters_[kMaxEffectParameters];
   std::optional<PreviousRun> previous_;
+  const Covariate* diameter_ = nullptr;  // of a table's propellers
   bool within_ = false;
 };
 
@@ -260,6 +266,12 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason =
         "only a table's thrust, coefficient, power or torque is held against a baseline without the density "
         "of its air";
+  if (effect.name == "tip_mach" && observations.from_table) {
+    if (observations.find(kDiameter) == nullptr) result.missing.emplace_back(kDiameter);
+    if (const auto why = observations.not_usable.find(std::string(kDiameter));
+        why != observations.not_usable.end())
+      result.reason = fmt::format("{} is {}", kDiameter, why->second);
+  }
   if (effect.name == "air_pressure" && is_made_c_t(observations))
     result.reason = "the pressure is in the density that thrusts are divided by";
   if (effect.scope == EffectScope::kPair && observations.channels() < 2)
