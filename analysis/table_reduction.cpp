@@ -2,6 +2,7 @@
 
 #include "analysis/air.h"
 #include "analysis/maps/gnuplot.h"
+#include "analysis/maps/staging.h"
 #include "analysis/resting_speed.h"
 #include "datasets/error.h"
 
@@ -172,7 +173,11 @@ std::optional<std::string> draw_coefficients(const TableReduction& reduction,
   const std::string terminal = extension == ".svg"
                                    ? "svg size 900,540 font 'sans,13' background '#ffffff'"
                                    : "pngcairo size 1350,810 font 'sans,18' background '#ffffff'";
-  return run_gnuplot("gnuplot", folder, plot_script(reduction, terminal, picture.filename().string()));
+  const std::string name = picture.filename().string();
+  const Staging staging(folder, "the picture");
+  auto failed = run_gnuplot("gnuplot", staging.path(), plot_script(reduction, terminal, name));
+  if (!failed) staging.publish({name});
+  return failed;
 }
 
 }  // namespace tunnelrig

@@ -267,19 +267,41 @@ std::string read_text(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-void write_text(const std::filesystem::path& path, std::string_view text) {
-  std::filesystem::path partial = path;
-  partial += fmt::format(".{}.part", ::getpid());
-  std::ofstream out(partial, std::ios::binary);
+namespace {
+
+[[noreturn]] void cannot_write(const std::filesystem::path& path, const std::string& reason) {
+  throw InputError::in(path.string(), "cannot be written: {}", reason);
+}
+
+bool put(const std::filesystem::path& path, std::string_view text) {
+  std::ofstream out(path, std::ios::binary);
   out.write(text.data(), static_cast<std::streamsize>(text.size()));
   out.close();
+  return static_cast<bool>(out);
+}
+
+}  // namespace
+
+void write_text(const std::filesystem::path& path, std::string_view text) {
   std::error_code error;
-  if (out) std::filesystem::rename(partial, path, error);
-  if (!out || error) {
-    const std::string reason = error ? error.message() : std::generic_category().message(errno);
-    std::filesystem::remove(partial, error);
-    throw InputError::in(path.string(), "cannot be written: {}", reason);
+  if (std::filesystem::is_other(std::filesystem::status(path, error))) {
+    if (!put(path, text)) cannot_write(path, std::generic_category().message(errno));
+    return;
   }
+  std::filesystem::path target = path;
+  constexpr int kMostLinks = 40;
+  for (int links = 0; links < kMostLinks && std::filesystem::is_symlink(target, error); ++links)
+    target = target.parent_path() / std::filesystem::read_symlink(target, error);
+  std::filesystem::path partial = target;
+  partial += fmt::format(".{}.part", ::getpid());
+  const bool whole = put(partial, text);
+  const int reason = errno;
+  error.clear();
+  if (whole) std::filesystem::rename(partial, target, error);
+  if (whole && !error) return;
+  const std::string why = error ? error.message() : std::generic_category().message(reason);
+  std::filesystem::remove(partial, error);
+  cannot_write(path, why);
 }
 
 }  // namespace tunnelrig

@@ -73,6 +73,13 @@ bool OwnEvidence::operator()(const Term& way) const {
   return baseline_.sees(respond(way, observations_, predicted_).derivative[0]);
 }
 
+std::optional<Eigen::Index> OwnEvidence::undefined(const Term& way) const {
+  const Eigen::MatrixXd column = respond(way, observations_, predicted_).derivative[0][0];
+  for (Eigen::Index row = 0; row < column.rows(); ++row)
+    if (!column.row(row).allFinite()) return row;
+  return {};
+}
+
 std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,
                            const std::vector<int>& rows) {
   std::vector<Term> ways;

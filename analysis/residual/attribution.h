@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -76,6 +77,8 @@ class OwnEvidence {
   /// Keeps references. `baseline`: alone, of the runs that count.
   OwnEvidence(const Observations& observations, const MixedModel& baseline);
   bool operator()(const Term& way) const;
+  /// The first row in which the way has no finite value: a logarithm of zero, for example.
+  std::optional<Eigen::Index> undefined(const Term& way) const;
 
  private:
   const Observations& observations_;

@@ -39,6 +39,17 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
   return result;
 }
 
+constexpr std::string_view kNoValue = "it has no value in ";
+
+std::string no_value_in_words(const Effect& effect, const Observations& observations, Index row) {
+  std::vector<std::string> conditions;
+  for (const std::string& name : effect.covariates)
+    if (const Covariate* covariate = observations.find(name))
+      conditions.push_back(fmt::format("{} = {:.4g}", name, covariate->value(row, 0)));
+  return fmt::format("{}{} ({})", kNoValue, observations.name[static_cast<std::size_t>(row)],
+                     fmt::join(conditions, ", "));
+}
+
 bool varies_within_groups(const Observations& observations, const Covariate& covariate) {
   std::map<int, double> first;
   for (const int row : observations.all_rows()) {
@@ -145,6 +156,8 @@ Testability CanBeFound::operator()(const Effect& effect) const {
   const std::vector<Term> ways = ways_to_try(effect, observations_, rows_);
   if (ways.empty())
     can.reason = "there are too few blocks on both sides of any step";
+  else if (const auto row = has_evidence_.undefined(ways[0]))
+    can.reason = no_value_in_words(effect, observations_, *row);
   else if (std::none_of(ways.begin(), ways.end(), std::cref(has_evidence_)))
     can.reason = observations_.from_table
                      ? "it does not vary within any group beside the baseline, which absorbs it"
@@ -155,6 +168,9 @@ Testability CanBeFound::operator()(const Effect& effect) const {
 void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
                        const std::vector<int>& rows, Explanation& explanation) {
   explanation.untestable = untestable_effects(observations, effects);
+  for (const Untestable& entry : explanation.untestable)
+    if (entry.reason.starts_with(kNoValue))
+      explanation.warnings.push_back(fmt::format("{} is not tried: {}", entry.effect, entry.reason));
   warn_of_unseen(observations, effects, rows, explanation);
   warn_of_collinear(observations, explanation);
 }

@@ -42,6 +42,7 @@ std::vector<double> at_zero(const std::vector<const Covariate*>& covariates, Eig
 inline constexpr std::string_view kGroundDistance = "ground_distance_R",
                                   kCeilingDistance = "ceiling_distance_R",
                                   kDiameter = "propeller_diameter_m";  // of a table's propellers
+inline constexpr double kLargestResponse = 1e100;  // squares of larger ones, summed, are no numbers
 inline constexpr const char* kConstantBaseline = "constant";  // a table's, where nothing else is said
 
 /// A place without ground or ceiling has no distance to it, and what depends on the distance is absent there.

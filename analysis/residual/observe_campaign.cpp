@@ -276,6 +276,9 @@ void set_response(const Source& source, const Response& response, Observations& 
   for (Index row = 0; row < source.rows(); ++row)
     for (Index c = 0; c < response.channels; ++c) {
       result.value(row, c) = response.value(row, c);
+      if (std::abs(result.value(row, c)) > kLargestResponse)
+        throw InputError::at("runs.csv", source.run(row).line, "the response {} is {:g}, beyond ±{:g}",
+                             result.response, result.value(row, c), kLargestResponse);
       result.known(row, c) = response.known(row, c);
     }
   result.multiplicative = result.value.minCoeff() > 0;

@@ -18,6 +18,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 constexpr int kFewestBlocks = 6;
+constexpr std::size_t kFewestOpenBlocks = 4;  // of six, the seal leaves as many
 
 /// Errors of the fitted runs themselves, n × c in the unit.
 MatrixXd residuals(const Observations& observations, const JointFit& fit, const std::vector<int>& rows) {
@@ -93,7 +94,28 @@ std::string verdict_of(const Explanation& explanation) {
   return confounded ? "confounded" : "explained";
 }
 
-/// Too few blocks to find out anything: errors of the baseline, by leaving blocks out where there are two.
+/// Why nothing can be found out, in words; empty where something can.
+std::string too_few(const Observations& observations, const Seal& seal) {
+  if (observations.blocks() < kFewestBlocks)
+    return fmt::format(
+        "{} too few to tell an effect from chance; {} are needed{}",
+        observations.blocks() == 1 ? "1 block is" : fmt::format("{} blocks are", observations.blocks()),
+        kFewestBlocks,
+        observations.from_table && observations.rows() >= kFewestBlocks
+            ? " (where rows count as independent: blocks = \"rows\", or bins(column, n))"
+            : "");
+  const auto open = places_of_each(observations.block, seal.open).size();
+  if (open < kFewestOpenBlocks)
+    return fmt::format("hold_out leaves {} {}, too few to tell an effect from chance; {} are needed", open,
+                       open == 1 ? "block" : "blocks", kFewestOpenBlocks);
+  if (MixedModel::baseline_alone(observations, seal.open).dof(0) < 1)
+    return fmt::format(
+        "the baseline has as many constants as there are {} to fit: nothing is left to explain",
+        observations.from_table ? "rows" : "runs");
+  return "";
+}
+
+/// Errors of the baseline, by leaving blocks out where there are two.
 void explain_too_few(const Observations& observations, const SearchSettings& settings,
                      Explanation& explanation) {
   const std::vector<int> rows = observations.all_rows();
@@ -116,13 +138,6 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
       scale_of(observations) *
       detectable_by_one(MixedModel(observations, rows, fit.variances.ratio), fit.variances, settings.alpha);
   explanation.verdict = "insufficient";
-  explanation.warnings.push_back(fmt::format(
-      "{} too few to tell an effect from chance; {} are needed{}",
-      observations.blocks() == 1 ? "1 block is" : fmt::format("{} blocks are", observations.blocks()),
-      kFewestBlocks,
-      observations.from_table && observations.rows() >= kFewestBlocks
-          ? " (where rows count as independent: blocks = \"rows\", or bins(column, n))"
-          : ""));
 }
 
 void report_adopted(const Observations& observations, const Attribution& found, const JointFit& whole,
@@ -309,12 +324,13 @@ Explanation explain_once(const Observations& observations, const std::vector<con
                          const SearchSettings& settings) {
   Explanation explanation = begin_explanation(observations);
   const std::vector<int> rows = observations.all_rows();
-  if (observations.blocks() < kFewestBlocks) {
+  const Seal seal = seal_blocks(observations, settings.seed);
+  if (const std::string why = too_few(observations, seal); !why.empty()) {
     report_untestable(observations, effects, rows, explanation);
     explain_too_few(observations, settings, explanation);
+    explanation.warnings.push_back(why);
     return explanation;
   }
-  const Seal seal = seal_blocks(observations, settings.seed);
   const bool own_baselines = observations.groups_within_blocks || !observations.held_out.empty();
   if (!seal.only_sealed.empty() && !own_baselines)
     explanation.warnings.push_back(only_sealed_in_words(seal.only_sealed));

@@ -82,7 +82,11 @@ class Search {
   /// In place of a candidate with amplitudes of the groups' own: the same effect alike in all, if α lets it
   /// in.
   std::size_t alike_instead(const Scan& scan, std::size_t i) const;
-  bool groups_within_bounds(const Observations& wider, const JointFit& fit) const;
+  bool groups_within_bounds(const Observations& wider, const JointFit& fit, std::size_t t) const;
+  static constexpr double kWeightInGroups = 0.25;  // as for one rotor alone
+  /// p of the F-test of amplitudes of the groups' own, which `wider` has as slopes beside those of `fewer`.
+  double p_of_groups(const Observations& fewer, const JointFit& without, const Observations& wider,
+                     const JointFit& with) const;
   bool another_does_as_well(const CrossValidation& own, const NullFit& variances) const;
   /// Whether it is one of the measured speed, of which the model does not have the square.
   bool lacks_speed_squared(const Term& term) const;
@@ -117,7 +121,8 @@ class Search {
   /// With a new effect in, an older one may be explained better by another: it gives way.
   void swap_weaker();
   double evidence_of(const Scan& scan, const Term& term) const;
-  JointFit fit_without(std::size_t t) const;
+  JointFit fit_without(std::size_t t) const { return fit_without(t, observations_); }
+  JointFit fit_without(std::size_t t, const Observations& observations) const;
   /// What each effect must be to reach the critical evidence in four of five data sets drawn from the null
   /// model (the typical one of its forms and shapes): of what varies from session to session far more is
   /// needed than of what varies from run to run.

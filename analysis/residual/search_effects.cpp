@@ -300,10 +300,10 @@ double Search::evidence_of(const Scan& scan, const Term& term) const {
   return highest;
 }
 
-JointFit Search::fit_without(std::size_t t) const {
+JointFit Search::fit_without(std::size_t t, const Observations& observations) const {
   MeanModel model = fit_.model;
   model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(t));
-  return fit_jointly(observations_, model, rows_);
+  return fit_jointly(observations, model, rows_);
 }
 
 void Search::set_detectable(const Scan& scan) {

@@ -32,7 +32,6 @@ Search::Scan Search::scan_effects_and_groups(const JointFit& base) const {
 
 void Search::add_group_ways(Scan& scan) const {
   constexpr std::size_t kMostGroups = 24;
-  constexpr double kWeight = 0.25;  // as for one rotor alone
   std::set<int> groups;
   for (const int row : rows_) groups.insert(observations_.group[static_cast<std::size_t>(row)]);
   if (groups.size() < 2 || groups.size() > kMostGroups) return;
@@ -41,7 +40,7 @@ void Search::add_group_ways(Scan& scan) const {
     const auto& parameters = scan.ways[i].effect->parameters;
     if (parameters.size() > 1 || parameters[0].theory || parameters[0].lower >= 0 || parameters[0].upper <= 0)
       continue;
-    Candidate own{.columns = {}, .sign = 0, .weight = kWeight};
+    Candidate own{.columns = {}, .sign = 0, .weight = kWeightInGroups};
     for (const int group : groups) {
       Components column = scan.candidates[i].columns[0];
       for (Index row = 0; row < observations_.rows(); ++row)
@@ -79,7 +78,9 @@ std::optional<double> Search::gain_of(const InGroups& own, bool before_others) c
   const CrossValidation before = cross_validate(observations_, difference(y_, fit_.linear.offset),
                                                 fit_.linear.columns, fit.variances, rows_);
   const LossDifference gain = compare(before, after);
-  if (!(gain.mean > gain.standard_error) || !groups_within_bounds(own.observations, fit)) return {};
+  if (!(gain.mean > gain.standard_error) ||
+      !groups_within_bounds(own.observations, fit, fit.model.terms.size() - 1))
+    return {};
   if (before_others && another_does_as_well(after, fit.variances)) return {};
   return before.rmse() - after.rmse();
 }
@@ -98,11 +99,7 @@ void Search::let_groups_differ(bool before_others) {
   MeanModel others = fit_.model;
   others.terms.pop_back();
   InGroups own = fit_in_groups(newest, std::move(others));
-  const auto before = sum_of_squares(observations_, fit_), after = sum_of_squares(own.observations, own.fit);
-  const double more = before.second - after.second;
-  if (more <= 0 || after.second <= 0) return;
-  const double f = (before.first - after.first) / more / (after.first / after.second);
-  if (!(f > 0) || f_upper_p(f, more, after.second) > settings_.alpha) return;
+  if (p_of_groups(observations_, fit_, own.observations, own.fit) > settings_.alpha) return;
   if (gain_of(own, before_others)) take(std::move(own));
 }
 
@@ -143,15 +140,23 @@ bool Search::another_does_as_well(const CrossValidation& own, const NullFit& var
   return false;
 }
 
-bool Search::groups_within_bounds(const Observations& wider, const JointFit& fit) const {
+bool Search::groups_within_bounds(const Observations& wider, const JointFit& fit, std::size_t t) const {
   constexpr std::size_t kOneOf = 20;  // 95 % intervals
-  const MeanModel& model = fit.model;
-  const EffectParameter& amplitude = model.terms.back().effect->parameters[0];
-  const auto groups = estimate_by_group(wider, model, model.terms.size() - 1, fit.variances, rows_);
+  const EffectParameter& amplitude = fit.model.terms[t].effect->parameters[0];
+  const auto groups = estimate_by_group(wider, fit.model, t, fit.variances, rows_);
   const auto outside = std::count_if(groups.begin(), groups.end(), [&](const GroupEstimate& group) {
     return group.low > amplitude.upper || group.high < amplitude.lower;
   });
   return static_cast<std::size_t>(outside) * kOneOf <= groups.size();
+}
+
+double Search::p_of_groups(const Observations& fewer, const JointFit& without, const Observations& wider,
+                           const JointFit& with) const {
+  const auto before = sum_of_squares(fewer, without), after = sum_of_squares(wider, with);
+  const double more = before.second - after.second;
+  if (more <= 0 || after.second <= 0) return 1;
+  const double f = (before.first - after.first) / more / (after.first / after.second);
+  return f > 0 ? f_upper_p(f, more, after.second) : 1;
 }
 
 std::pair<double, double> Search::sum_of_squares(const Observations& observations,

@@ -2,6 +2,7 @@
 #include "analysis/residual/search.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 namespace tunnelrig {
@@ -76,12 +77,17 @@ bool Search::within_bounds(const Scan& scan, std::size_t i) {
 
 std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
   std::vector<Ranked> result;
-  Index place = observations_.slopes.cols();
-  for (auto other = result_.accepted.rbegin(); other != result_.accepted.rend(); ++other) {
-    if (!other->term.per_group) continue;
-    --place;
-    if (other->term.effect == accepted.term.effect) break;
-  }
+  Index place =
+      observations_.slopes.cols();  // of its column: effects of groups are the last slopes, in order
+  std::size_t t = fit_.model.terms.size();
+  do {
+    if (fit_.model.terms[--t].per_group) --place;
+  } while (!fit_.model.terms[t].same_way(accepted.term));
+  Observations fewer = observations_;
+  for (Index k = place; k + 1 < fewer.slopes.cols(); ++k)
+    fewer.slopes.col(k) = observations_.slopes.col(k + 1);
+  fewer.slopes.conservativeResize(Eigen::NoChange, fewer.slopes.cols() - 1);
+  const JointFit without = fit_without(t, fewer);
   const Eigen::MatrixXd predicted = predict_response(observations_, {}, rows_);
   const Components y = difference(y_, fit_.linear.offset);
   const CrossValidation own = cross_validate(observations_, y, fit_.linear.columns, fit_.variances, rows_);
@@ -94,7 +100,15 @@ std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
     Observations other = observations_;
     other.slopes.col(place) = respond(way, observations_, predicted).derivative[0][0];
     const CrossValidation with_other = cross_validate(other, y, fit_.linear.columns, fit_.variances, rows_);
-    if (!compare(with_other, own).told_apart()) result.push_back({.term = way});
+    if (compare(with_other, own).told_apart()) continue;
+    MeanModel instead = fit_.model;
+    instead.terms[t] = way;
+    instead.terms[t].per_group = true;
+    const JointFit fit = fit_jointly(other, instead, rows_);
+    const double evidence =
+        -std::log10(std::max(p_of_groups(fewer, without, other, fit), 1e-300)) + std::log10(kWeightInGroups);
+    if (evidence >= critical_ && fit.at_bound.empty() && groups_within_bounds(other, fit, t))
+      result.push_back({.term = way});
   }
   return result;
 }

@@ -34,6 +34,9 @@ void set_response(const TableSource& source, const ObservationChoice& choice, Ob
     result.value(r, 0) = source.converted(r, column);
     if (std::isnan(result.value(r, 0)))
       throw InputError::in(row.place, "the response {} is empty", result.response);
+    if (std::abs(result.value(r, 0)) > kLargestResponse)
+      throw InputError::in(row.place, "the response {} is {:g}, beyond ±{:g}", result.response,
+                           result.value(r, 0), kLargestResponse);
     if (!reduced) continue;
     const double density = dry_air_density_kg_m3(row.air_pressure_Pa, row.air_temperature_C + kZeroCelsius_K);
     result.known(r, 0) = density * std::pow(*row.speed_rpm / 60, 2) *
