@@ -26,7 +26,8 @@ live::LiveSettings live_settings(const LogOptions& options, Logging& logging, st
                               .address = options.listen.empty() ? "127.0.0.1" : options.listen,
                               .port = *options.live_port,
                               .metadata = {}};
-  for (const auto& [column, value] : kConditionOptions) settings.metadata.emplace(column, options.*value);
+  for (const auto& [column, option, value] : kConditionOptions)
+    settings.metadata.emplace(column, options.*value);
   return settings;
 }
 
@@ -175,7 +176,7 @@ class LiveLogging {
 
   void apply_metadata() {
     const auto metadata = page_.desk().metadata();
-    for (const auto& [column, value] : kConditionOptions) {
+    for (const auto& [column, option, value] : kConditionOptions) {
       if (const auto said = metadata.find(column); said != metadata.end())
         logging_.options().*value = said->second;
     }

@@ -30,10 +30,21 @@ double now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
+/// What no run sheet could hold would make every run of the file unreadable: it is refused before there is
+/// one.
+const LogOptions& checked(const LogOptions& options) {
+  if (options.repeat < 0) throw InputError(fmt::format("--repeat: {} is below 0", options.repeat));
+  for (const auto& [column, option, value] : kConditionOptions)
+    if (const auto given = options.*value)
+      if (const std::string why = outside_range(column, *given); !why.empty())
+        throw InputError(fmt::format("{}: {}", option, why));
+  return options;
+}
+
 }  // namespace
 
 Logging::Logging(const LogOptions& options)
-    : options_(options), file_(options.db, CampaignFile::Access::kRecord) {
+    : options_(checked(options)), file_(options.db, CampaignFile::Access::kRecord) {
   if (file_.empty()) {
     const std::string toml =
         options.campaign.empty() ? reference_campaign_toml() : read_text(options.campaign);

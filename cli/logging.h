@@ -35,16 +35,16 @@ struct LogOptions {
 
 /// What the instruments beside the board read, by the column that it is stored in.
 struct ConditionOption {
-  const char* column;
+  const char *column, *option;
   std::optional<double> LogOptions::*value;
 };
 inline constexpr std::array<ConditionOption, 6> kConditionOptions = {
-    {{"speed_rpm", &LogOptions::speed_rpm},
-     {"air_temperature_C", &LogOptions::temperature_C},
-     {"air_pressure_Pa", &LogOptions::pressure_Pa},
-     {"relative_humidity", &LogOptions::humidity},
-     {"supply_voltage_V", &LogOptions::supply_V},
-     {"time_since_motor_start_s", &LogOptions::motor_s}}};
+    {{"speed_rpm", "--speed-rpm", &LogOptions::speed_rpm},
+     {"air_temperature_C", "--temperature-C", &LogOptions::temperature_C},
+     {"air_pressure_Pa", "--pressure-Pa", &LogOptions::pressure_Pa},
+     {"relative_humidity", "--humidity", &LogOptions::humidity},
+     {"supply_voltage_V", "--supply-V", &LogOptions::supply_V},
+     {"time_since_motor_start_s", "--motor-s", &LogOptions::motor_s}}};
 
 /// The run under way is to end; the whole program is. Set by Ctrl-C (both) and by the live page (the first).
 extern std::atomic<bool> stop_requested, quit_requested;

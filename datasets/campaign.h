@@ -122,6 +122,10 @@ struct Run {
   bool in_tunnel() const { return y_norm.has_value() && z_norm.has_value(); }
 };
 
+/// Why a column of runs.csv cannot hold a value, in words: its range, and the unit that is meant. Empty where
+/// it can; any number can stand in a column that the suite does not know.
+std::string outside_range(std::string_view column, double value);
+
 /// Parses runs.csv. Throws InputError naming file, line and column for a missing required column, a run named
 /// twice, a number that does not parse, or a value outside what its unit allows.
 std::vector<Run> parse_runs(const Sheet& sheet, const CampaignInfo& campaign);

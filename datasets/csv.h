@@ -70,9 +70,9 @@ std::optional<double> parse_number(std::string_view text);
 /// Whole file as text; throws InputError where it cannot be read.
 std::string read_text(const std::filesystem::path& path);
 
-/// Writes a text file through a temporary one and a rename, so that it is whole or absent. Where the path leads
-/// to a device or a pipe, that takes the text; where it is a link to a file, the link stays. Throws InputError
-/// where it cannot be written.
+/// Writes a text file through a temporary one and a rename, so that it is whole or absent. Where the path
+/// leads to a device or a pipe, that takes the text; where it is a link to a file, the link stays. Throws
+/// InputError where it cannot be written.
 void write_text(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace tunnelrig

@@ -107,14 +107,8 @@ bool has_numbers(const Sheet& sheet, std::size_t column) {
 }
 
 void check_range(const Sheet& sheet, std::size_t row, std::string_view column, double value) {
-  const KnownColumn* known = known_column(column);
-  if (known == nullptr || (value >= known->lowest && value <= known->highest)) return;
-  const std::string kelvin =
-      column.ends_with("_C") && value < -273.15
-          ? fmt::format(" ({:g} °C is {:g} K: below absolute zero)", value, value + 273.15)
-          : "";
-  throw InputError(fmt::format("{}: {:g} is outside {:g} to {:g}; {}{}", sheet.where(row, column), value,
-                               known->lowest, known->highest, known->hint, kelvin));
+  if (const std::string why = outside_range(column, value); !why.empty())
+    throw InputError(fmt::format("{}: {}", sheet.where(row, column), why));
 }
 
 std::string required_text(const Sheet& sheet, std::size_t row, std::string_view column) {
@@ -213,6 +207,17 @@ void check_source(const Sheet& sheet, const Run& run, const CampaignInfo& campai
 }
 
 }  // namespace
+
+std::string outside_range(std::string_view column, double value) {
+  const KnownColumn* known = known_column(column);
+  if (known == nullptr || (value >= known->lowest && value <= known->highest)) return "";
+  const std::string kelvin =
+      column.ends_with("_C") && value < -273.15
+          ? fmt::format(" ({:g} °C is {:g} K: below absolute zero)", value, value + 273.15)
+          : "";
+  return fmt::format("{:g} is outside {:g} to {:g}; {}{}", value, known->lowest, known->highest, known->hint,
+                     kelvin);
+}
 
 std::optional<double> Run::number(std::string_view column) const {
   const auto found = numbers.find(column);
