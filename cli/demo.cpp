@@ -1,6 +1,7 @@
 // tunnelrig demo: the whole chain on the virtual rig, each step the command that a user would type.
 #include "cli/console.h"
 #include "cli/verb.h"
+#include "datasets/csv.h"
 #include "datasets/error.h"
 
 #include <array>
@@ -116,9 +117,7 @@ int run_demo(const DemoOptions& options) {
   const std::filesystem::path db = std::filesystem::path(options.out) / "campaign.db";
   if (std::filesystem::exists(db))
     throw InputError::in(db.string(), "is there already; name another folder with --out");
-  std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  if (error) throw InputError::in(options.out, "cannot be made: {}", error.message());
+  make_folder(options.out);
   return Demo(options).run();
 }
 

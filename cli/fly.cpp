@@ -167,6 +167,7 @@ int run_fly(const FlyOptions& given) {
   const bool programme = options.scenario == "all";
   const std::vector<PlaceAndPath> wanted = programme_of(options);
   check_all(options, wanted, gains);
+  if (!options.out.empty()) make_folder(options.out);
   std::vector<FlownScenario> flown;
   fmt::print("SIMULATED flights; map: {}\n\n", map.name);
   for (const PlaceAndPath& one : wanted) {

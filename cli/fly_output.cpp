@@ -196,7 +196,7 @@ void print_beside_thesis(const std::vector<FlownScenario>& flown) {
 std::vector<std::filesystem::path> write_flown(const std::filesystem::path& folder,
                                                const FlownScenario& flown, const FlightTask& task,
                                                std::string& warning) {
-  std::filesystem::create_directories(folder);
+  make_folder(folder);
   std::vector<std::filesystem::path> files;
   const auto write = [&](const std::string& name, const std::string& text) {
     files.push_back(folder / name);

@@ -4,8 +4,13 @@
 #include "cli/verbs.h"
 #include "datasets/error.h"
 
+#include <cerrno>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <string>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -16,6 +21,21 @@ int report(const std::string& text, int code) {
   const bool colour = error_is_terminal();
   fmt::print(stderr, "{}tunnelrig:{} {}\n", colour ? "\x1b[31m" : "", colour ? "\x1b[0m" : "", text);
   return code;
+}
+
+int cannot_print() {
+  return report(fmt::format("standard output cannot be written: {}", std::generic_category().message(errno)),
+                kBadInput);
+}
+
+/// What a text would be a number of, and is none: CLI11 reads it, and every range lets it pass.
+void refuse_nan(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options())
+    if (option->get_type_name().starts_with("FLOAT"))
+      for (const std::string& text : option->results())
+        if (std::isnan(std::strtod(text.c_str(), nullptr)))
+          throw InputError(fmt::format("{} {}: a number is required", option->get_name(), text));
+  for (const CLI::App* verb : app.get_subcommands()) refuse_nan(*verb);
 }
 
 int run(int argc, char** argv) {
@@ -29,7 +49,9 @@ int run(int argc, char** argv) {
     app.exit(error);
     return asked_for_help ? kWell : kBadInput;
   }
-  return work();
+  refuse_nan(app);
+  const int code = work();
+  return std::fflush(stdout) == 0 ? code : cannot_print();
 }
 
 }  // namespace
@@ -45,6 +67,7 @@ int main(int argc, char** argv) {
   } catch (const StorageError& error) {
     return cli::report(error.what(), cli::kProblemFound);
   } catch (const std::exception& error) {
+    if (std::ferror(stdout) != 0) return cli::cannot_print();
     return cli::report(fmt::format("this should not have happened: {}", error.what()), cli::kProblemFound);
   }
 }

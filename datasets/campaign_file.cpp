@@ -93,6 +93,28 @@ std::filesystem::path with_suffix(const std::filesystem::path& path, std::string
   return path.string() + std::string(suffix);
 }
 
+/// The file, and its folder for the journal beside it.
+bool is_writable(const std::filesystem::path& path) {
+  const std::filesystem::path folder = path.parent_path().empty() ? "." : path.parent_path();
+  return ::access(path.c_str(), W_OK) == 0 && ::access(folder.c_str(), W_OK) == 0;
+}
+
+bool has_no_journal(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::filesystem::path journal = with_suffix(path, "-wal");
+  return !std::filesystem::exists(journal, error) || std::filesystem::file_size(journal, error) == 0;
+}
+
+/// SQLite would make a journal beside a file even to read it, which a reader without rights cannot; a file
+/// without one, that this reader cannot change, is read as it is.
+std::string unchanging(const std::filesystem::path& path) {
+  std::string uri = "file:";
+  for (const char c : path.string())
+    c == '%' || c == '?' || c == '#' ? uri += fmt::format("%{:02X}", static_cast<unsigned char>(c))
+                                     : uri += std::string(1, c);
+  return uri + "?immutable=1";
+}
+
 }  // namespace
 
 void migrate(Database& database, std::string_view schema) {
@@ -109,7 +131,7 @@ void migrate(Database& database, std::string_view schema) {
 CampaignFile::CampaignFile(const std::filesystem::path& path, Access access) : path_(path) {
   std::error_code error;
   if (access != Access::kRecord && !std::filesystem::is_regular_file(path, error)) {
-    throw InputError::in(path.string(), "there is no such campaign file");
+    throw InputError::in(path.string(), "{}", absence(error, "there is no such campaign file"));
   }
   if (access == Access::kRecord) {
     lock_ = lock_for_recording(path);
@@ -120,12 +142,15 @@ CampaignFile::CampaignFile(const std::filesystem::path& path, Access access) : p
   }
   // A reader that may write opens for writing all the same: SQLite lets only such a connection fold the
   // journal back into the file when it closes last, and a campaign should be one file wherever it can.
-  const bool writable = ::access(path.c_str(), W_OK) == 0 &&
-                        ::access(path.parent_path().empty() ? "." : path.parent_path().c_str(), W_OK) == 0;
+  const bool writable = is_writable(path);
+  if (access == Access::kWrite && !writable)
+    throw InputError::in(path.string(), "cannot be written: the file and its folder must be writable");
   const int flags = access == Access::kRecord              ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE
                     : access == Access::kWrite || writable ? SQLITE_OPEN_READWRITE
                                                            : SQLITE_OPEN_READONLY;
-  database_ = std::make_unique<Database>(path.string(), flags);
+  database_ = flags == SQLITE_OPEN_READONLY && has_no_journal(path)
+                  ? std::make_unique<Database>(unchanging(path), flags | SQLITE_OPEN_URI)
+                  : std::make_unique<Database>(path.string(), flags);
   try {
     check_kind_of_file(*database_, path.string());
   } catch (const StorageError&) {

@@ -38,10 +38,10 @@ Sheet read_sheet(const fs::path& folder, const std::string& name) {
 FolderText read_folder_text(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
-    throw InputError::in(folder.string(), "there is no such campaign folder");
+    throw InputError::in(folder.string(), "{}", absence(error, "there is no such campaign folder"));
   for (const char* name : {"campaign.toml", "calibration.csv", "runs.csv"}) {
     if (!fs::exists(folder / name, error))
-      throw InputError::in(folder.string(), "the file {} is missing", name);
+      throw InputError::in(folder.string(), "the file {} {}", name, absence(error, "is missing"));
   }
   FolderText text;
   text.info = parse_campaign_toml(read_text(folder / "campaign.toml"), "campaign.toml");
@@ -68,7 +68,8 @@ fs::path raw_path(const fs::path& folder, const Run& run) {
   }
   std::error_code error;
   if (!fs::is_regular_file(folder / relative, error)) {
-    throw InputError::at("runs.csv", run.line, "run {}: the raw file {} is missing", run.run, run.raw);
+    throw InputError::at("runs.csv", run.line, "run {}: the raw file {} {}", run.run, run.raw,
+                         absence(error, "is missing"));
   }
   return folder / relative;
 }

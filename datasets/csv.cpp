@@ -257,6 +257,19 @@ std::string format_csv(const Sheet& sheet) {
   return out;
 }
 
+std::string absence(const std::error_code& error, std::string_view otherwise) {
+  return error == std::errc::permission_denied ? "cannot be read: " + error.message()
+                                               : std::string(otherwise);
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw InputError::in(folder.string(), "cannot be made: {}", error.message());
+  if (::access(folder.c_str(), W_OK) != 0)
+    throw InputError::in(folder.string(), "cannot be written to: {}", std::generic_category().message(errno));
+}
+
 std::string read_text(const std::filesystem::path& path) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace tunnelrig {
@@ -66,6 +67,13 @@ std::string format_csv(const Sheet& sheet);
 
 /// Strict decimal number (no blanks inside, point as decimal mark, finite), or nothing.
 std::optional<double> parse_number(std::string_view text);
+
+/// What to say of a path where nothing could be found: that it may not be looked at, or `otherwise`.
+std::string absence(const std::error_code& error, std::string_view otherwise);
+
+/// Makes a folder to write to, where it is missing. Throws InputError naming it where that cannot be, or
+/// nothing can be written in it.
+void make_folder(const std::filesystem::path& folder);
 
 /// Whole file as text; throws InputError where it cannot be read.
 std::string read_text(const std::filesystem::path& path);

@@ -40,6 +40,8 @@ StagedOutput::StagedOutput(const fs::path& target, Kind kind) : target_(without_
     if (error) throw InputError::in(target_.string(), "cannot be written: {}", error.message());
   } else if (const fs::path place = fs::absolute(target_).parent_path(); !fs::is_directory(place, error)) {
     throw InputError::in(target_.string(), "cannot be written: there is no folder {}", place.string());
+  } else if (::access(place.c_str(), W_OK) != 0) {
+    throw InputError::in(target_.string(), "cannot be written: {}", std::generic_category().message(errno));
   }
 }
 

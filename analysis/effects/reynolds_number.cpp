@@ -3,25 +3,23 @@
 #include "analysis/effects/effect.h"
 
 #include <cmath>
-#include <numbers>
 
 namespace tunnelrig::effects {
 namespace {
 
-/// Viscosity by Sutherland; the density at 101325 Pa where the pressure was not measured.
-double reynolds(std::span<const double> x, const Rig& rig) {
+/// ρ Ω/μ: radius and chord cancel in Re / Re0, and need not be known. Viscosity by Sutherland; the density at
+/// 101325 Pa where the pressure was not measured.
+double reynolds_per_length2(std::span<const double> x) {
   const double kelvin = x[1] + kZeroCelsius_K;
   const double pressure_Pa = x.size() > 2 ? x[2] : 101325.0;
-  const double tip_m_s = x[0] * 2 * std::numbers::pi / 60 * rig.propeller_radius_m;
-  return dry_air_density_kg_m3(pressure_Pa, kelvin) * tip_m_s * rig.blade_chord_m /
-         air_viscosity_Pa_s(kelvin);
+  return dry_air_density_kg_m3(pressure_Pa, kelvin) * x[0] / air_viscosity_Pa_s(kelvin);
 }
 
 struct ReynoldsNumber {
   template <class T>
   T operator()(const Sample& s, const T* p, const T& force) const {
     using std::pow;
-    const double ratio = reynolds(s.x, *s.rig) / reynolds(s.reference, *s.rig);
+    const double ratio = reynolds_per_length2(s.x) / reynolds_per_length2(s.reference);
     return force * pow(T(ratio), p[0]);
   }
 };
