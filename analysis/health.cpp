@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 namespace tunnelrig {
@@ -45,12 +46,15 @@ class Examination {
   }
 
   void raw_data(const std::function<void(std::size_t, std::size_t)>& progress) {
-    Names damaged, changed;
+    Names damaged, changed, alike;
+    std::map<std::string, std::string> first;  // run of each hash
     std::size_t done = 0;
     for (const auto& [name, run] : data_.raw) {
       try {
         const std::string hash = hash_of(run);
         if (!run.hash.empty() && hash != run.hash) changed.add(name);
+        const auto [known, fresh] = first.emplace(hash, name);
+        if (!fresh && run.frames > 0) alike.add(fmt::format("{} and {}", known->second, name));
       } catch (const StorageError&) {
         damaged.add(name);
       }
@@ -61,7 +65,10 @@ class Examination {
               "restore the file from a copy, or record these runs again");
     if (!changed.empty())
       problem("raw data", "not what was recorded: " + changed.text(), "restore the file from a copy");
-    if (damaged.empty() && changed.empty())
+    if (!alike.empty())
+      problem("raw data", "the same frames in " + alike.text(),
+              "one recording counts twice: correct `raw` in runs.csv, or exclude one of them");
+    if (damaged.empty() && changed.empty() && alike.empty())
       good("raw data", fmt::format("{} runs, every blob has its checksum", data_.raw.size()));
   }
 

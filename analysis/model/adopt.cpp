@@ -106,9 +106,9 @@ bool adoptable(const Observations& observations) {
 
 void require_adoptable(const Observations& observations) {
   if (!adoptable(observations))
-    throw InputError(
-        fmt::format("--adopt: a model corrects the thrusts of a campaign, and this explains {} of {}",
-                    observations.response, observations.campaign));
+    throw InputError(fmt::format(
+        "--adopt: a model corrects the thrusts of a campaign, and this explains {} of {}",
+        observations.response, observations.campaign.empty() ? "a table" : observations.campaign));
 }
 
 Adoption adopt(const Observations& observations, const Explanation& explanation, bool empirical) {

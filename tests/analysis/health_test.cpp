@@ -111,5 +111,14 @@ TEST_F(Health, AnOldCertificateAndAnOpenLedger) {
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("loss ledger: emitted is not stored plus lost in R1"));
 }
 
+TEST_F(Health, OneRecordingOfTwoRuns) {
+  const auto at = campaign.runs_csv.find("raw/R2.npy");
+  ASSERT_NE(at, std::string::npos);
+  campaign.runs_csv.replace(at, 10, "raw/R1.npy");
+  import();
+  calibrate_file();
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("raw data: the same frames in R1 and R2"));
+}
+
 }  // namespace
 }  // namespace tunnelrig

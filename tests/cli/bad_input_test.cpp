@@ -4,6 +4,7 @@
 #include "support/example_campaign.h"
 #include "support/temporary_folder.h"
 
+#include <cstdlib>
 #include <functional>
 
 #include <gmock/gmock.h>
@@ -161,6 +162,38 @@ TEST_F(BadInput, CalibrationThatSaysNothing) {
   campaign.write(folder / "source");
   ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
   EXPECT_THAT(refusal_of("calibrate --db c.db", {"source", "c.db"}), HasSubstr("cell 1"));
+}
+
+/// A row that no verb could read again would lock the whole file.
+TEST_F(BadInput, ConditionsThatNoSheetCanHold) {
+  const auto refused = [&](const std::string& option) {
+    return refusal_of("log --db c.db --location OT --session S1 --duration 1 --speed max " + option, {});
+  };
+  EXPECT_THAT(refused("--humidity 45"),
+              HasSubstr("--humidity: 45 is outside 0 to 1; a fraction from 0 to 1"));
+  EXPECT_THAT(refused("--temperature-C 294"), HasSubstr("--temperature-C: 294 is outside -80 to 80"));
+  EXPECT_THAT(refused("--temperature-C nan"), HasSubstr("--temperature-C nan: a number is required"));
+  EXPECT_THAT(refused("--pressure-Pa 1013"), HasSubstr("pascal, not hectopascal"));
+  EXPECT_THAT(refused("--supply-V -1"), HasSubstr("--supply-V: -1"));
+  EXPECT_THAT(refused("--speed-rpm -5"), HasSubstr("--speed-rpm: -5"));
+  EXPECT_THAT(refused("--motor-s -3"), HasSubstr("--motor-s: -3"));
+  EXPECT_THAT(refused("--repeat -1"), HasSubstr("--repeat: -1"));
+}
+
+TEST_F(BadInput, ALogThatFailsLeavesNoFile) {
+  const std::string log = "log --db c.db --session S1 --duration 1 ";
+  EXPECT_THAT(refusal_of(log + "--location OT --source tcp:localhost:1", {}), HasSubstr("cannot be opened"));
+  EXPECT_THAT(refusal_of(log + "--location Q9 --speed max", {}),
+              HasSubstr("does not know the location 'Q9'"));
+  EXPECT_THAT(refusal_of(log + "--location OT --campaign none.toml", {}), HasSubstr("none.toml"));
+}
+
+TEST_F(BadInput, OutputThatCannotBeWritten) {
+  for (const char* arguments : {"explain --list", "explain --list --json -"}) {
+    const int status = std::system(  // NOLINT(concurrency-mt-unsafe)
+        fmt::format("\"{}\" {} > /dev/full 2> /dev/null", TUNNELRIG_PROGRAM, arguments).c_str());
+    EXPECT_EQ(WEXITSTATUS(status), 2) << arguments;
+  }
 }
 
 }  // namespace

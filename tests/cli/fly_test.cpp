@@ -167,7 +167,7 @@ TEST_F(Fly, OtherBadOptionsAreRefused) {
   EXPECT_THAT(refusal("--controllers lqr"), HasSubstr("no controller is called 'lqr'; there are ibs,"));
   EXPECT_THAT(refusal("--position guessed"), HasSubstr("must be lidar, lidar-thesis or given"));
   EXPECT_THAT(refusal("--motor-loss 0.9"), HasSubstr("motor_loss"));
-  EXPECT_THAT(refusal("--payload-kg nan"), HasSubstr("payload_kg"));
+  EXPECT_THAT(refusal("--payload-kg nan"), HasSubstr("--payload-kg nan: a number is required"));
   write_text(folder / "g.toml", "format = \"tunnelrig-gains/1\"\n[ibs]\nk1_y = -3\n");
   EXPECT_THAT(refusal("--gains g.toml"), HasSubstr("g.toml:3: ibs.k1_y must be a number from"));
 }

@@ -1,6 +1,7 @@
 #include "datasets/csv.h"
 
 #include "support/message_of.h"
+#include "support/temporary_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -71,6 +72,23 @@ TEST(Csv, OtherSeparatorsAreNamed) {
   EXPECT_THAT(missing("g;y;x\na;1,5;0,1\n"),
               HasSubstr("3 cells where the header has 1 columns; the header looks separated by semicolons"));
   EXPECT_THAT(missing("g,x\na,1\n"), testing::EndsWith("the required column y is missing"));
+}
+
+TEST(WriteText, KeepsLinksAndDevices) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "old.txt", "old");
+  std::filesystem::create_symlink("old.txt", folder / "link.txt");
+  std::filesystem::create_symlink("new.txt", folder / "dangling.txt");
+  std::filesystem::create_symlink("/dev/null", folder / "nothing.txt");
+  for (const char* name : {"link.txt", "dangling.txt", "nothing.txt"}) {
+    write_text(folder / name, "text");
+    EXPECT_TRUE(std::filesystem::is_symlink(folder / name)) << name;
+  }
+  EXPECT_EQ(read_text(folder / "old.txt"), "text");
+  EXPECT_EQ(read_text(folder / "new.txt"), "text");
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  EXPECT_EQ(test::message_of([&] { write_text("/dev/full", "text"); }),
+            "/dev/full: cannot be written: No space left on device");
 }
 
 }  // namespace

@@ -258,5 +258,26 @@ TEST(RunCorrelation, IsFoundWhereItIsAndNowhereElse) {
   }
 }
 
+/// As far as a run is from what the others say of it: alike for all of a block, however they resemble each
+/// other.
+TEST(MixedModel, SizesThatAreLeftAreAlikeWhereRunsAre) {
+  std::mt19937_64 random{test::seed()};
+  constexpr int kBlocks = 12, kRuns = 12, kSets = 40;
+  for (const double correlation : {0.0, 0.5, 0.8}) {
+    Observations o = test::simulate({.runs_of_block = std::vector<int>(kBlocks, kRuns), .groups = 1}, random);
+    o.scatter.run_correlation = {correlation, correlation};
+    const MixedModel model(o, o.all_rows());
+    double first = 0, others = 0;
+    for (int set = 0; set < kSets; ++set) {
+      const Components residual = {MatrixXd(model.simulate_unit(0, 0, 1, correlation, random))};
+      const MatrixXd sizes = model.sizes_left({0}, {1.0}, residual, {}, random)[0];
+      for (Eigen::Index run = 0; run < sizes.rows(); ++run)
+        (run % kRuns == 0 ? first : others) += std::pow(sizes(run, 0), 2);
+    }
+    EXPECT_NEAR(std::sqrt(first / (kBlocks * kSets)), 1, 0.15) << correlation;
+    EXPECT_NEAR(std::sqrt(others / (kBlocks * (kRuns - 1) * kSets)), 1, 0.05) << correlation;
+  }
+}
+
 }  // namespace
 }  // namespace tunnelrig

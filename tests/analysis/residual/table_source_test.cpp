@@ -1,11 +1,13 @@
 // Which rows of a table are explained, and as what.
 #include "analysis/residual/explanation_output.h"
 #include "analysis/residual/tables.h"
+#include "datasets/error.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -179,7 +181,8 @@ TEST_F(TableSourceTest, RowsWithoutAirHaveNoC_TAndItsPressureIsNotSoughtAgain) {
               ElementsAre(HasSubstr("1 row: the temperature or the pressure of the air is empty")));
   EXPECT_THAT(testability(effect_named("air_pressure"), o).reason, HasSubstr("density"));
   EXPECT_EQ(explained(o).verdict, "no_structure");
-  EXPECT_EQ(observed(csv, schema, "constant").rows(), 95) << "what is the default is the same when it is said";
+  EXPECT_EQ(observed(csv, schema, "constant").rows(), 95)
+      << "what is the default is the same when it is said";
 }
 
 /// Of a cell for forces and moments: both load it.
@@ -299,6 +302,92 @@ TEST_F(SixAxesTest, AxesThatMayStandForEachOtherAreNotTakenTogether) {
                                              {2, {{4, -0.12}}}},
                                             0),
                                    schema_of("blocks = \"mount\"\n"), "linear:fx"));
+}
+
+/// A C_T that goes with the tip's Mach number, propellers of two sizes in one table.
+TEST_F(TableSourceTest, EveryRowHasTheTipOfItsOwnPropeller) {
+  std::string csv = "b,prop,D,N,T,y\n";
+  for (int r = 0; r < 144; ++r) {
+    const bool large = r % 2 == 0;
+    const double diameter_m = large ? 0.6 : 0.127, rpm = (large ? 4000 : 20000) * (0.5 + 1.2 * even(random));
+    const double celsius = 10 + 20 * even(random);
+    const double mach =
+        rpm * std::numbers::pi / 60 * diameter_m / std::sqrt(1.4 * 287.05 * (celsius + 273.15));
+    csv += fmt::format("{},{},{},{},{},{}\n", r / 12, large ? "large" : "small", diameter_m, rpm, celsius,
+                       0.1 * std::pow(1 - mach * mach, -0.5) * (1 + 0.0005 * scatter(random)));
+  }
+  const std::string schema =
+      "groups = [\"prop\"]\nblocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"1\"\nmeaning = "
+      "\"c_t_propeller\"\n"
+      "[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\nmeaning = "
+      "\"air_temperature_C\"\n";
+  const Explanation e =
+      explained(observed(csv, schema + "[propeller]\ndiameter_column = \"D\"\ndiameter_unit = \"m\"\n"));
+  ASSERT_EQ(names(e), "tip_mach ") << explanation_text(e);
+  EXPECT_NEAR(e.adopted[0].parameters[0].value, 0.5, 0.02);
+  EXPECT_THAT(testability(effect_named("tip_mach"), observed(csv, schema)).missing,
+              ElementsAre("propeller_diameter_m"));
+}
+
+/// Readings of one sign, whichever it is: the run that would tell two names apart is the same.
+TEST_F(TableSourceTest, TheSeparatingRunIsThatOfTheMagnitudes) {
+  std::string up = "b,g,N,T,y\n", down = up;
+  for (int r = 0; r < 96; ++r) {
+    const double rpm = 4800 + 400 * even(random), celsius = 20 + 0.2 * scatter(random);
+    const double c_t = 0.1 * std::pow(rpm / 5000, 0.4) * (1 + 0.002 * scatter(random));
+    const std::string row = fmt::format("{},{},{},{},", r / 8, r % 2 == 0 ? "p" : "q", rpm, celsius);
+    up += row + fmt::format("{}\n", c_t);
+    down += row + fmt::format("{}\n", -c_t);
+  }
+  const std::string schema =
+      "groups = [\"g\"]\nblocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"1\"\nmeaning = "
+      "\"c_t_propeller\"\n"
+      "[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\nmeaning = "
+      "\"air_temperature_C\"\n";
+  const Explanation plus = explained(observed(up, schema)), minus = explained(observed(down, schema));
+  ASSERT_EQ(plus.verdict, "confounded") << explanation_text(plus);
+  ASSERT_TRUE(plus.adopted[0].separating_run.has_value());
+  ASSERT_TRUE(minus.adopted[0].separating_run.has_value());
+  EXPECT_EQ(plus.adopted[0].separating_run->text, minus.adopted[0].separating_run->text);
+}
+
+/// One zero among voltages that are no zero elsewhere: a power of it is no number.
+TEST_F(TableSourceTest, WhereAnEffectHasNoValueIsSaid) {
+  std::string csv = "b,V,y\n";
+  for (int r = 0; r < 96; ++r) {
+    const double volts = 10 + 2 * even(random);
+    csv +=
+        fmt::format("{},{},{}\n", r / 8, r == 50 ? 0 : volts, 8 * volts / 11 * (1 + 0.003 * scatter(random)));
+  }
+  const Explanation e =
+      explained(observed(csv,
+                         "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+                         "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n"));
+  EXPECT_THAT(e.warnings, Contains(HasSubstr("supply_voltage is not tried: it has no value in t.csv:52")));
+  EXPECT_NE(e.verdict, "no_structure");
+}
+
+TEST_F(TableSourceTest, AResponseWhoseSquaresAreNoNumbersIsRefused) {
+  try {
+    observed("x,y\n1,2\n2,3e120\n", "[response]\ncolumn = \"y\"\nunit = \"N\"\n");
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("t.csv:3: the response y is 3e+120"));
+  }
+}
+
+/// What hold_out leaves must be enough to search, and the baseline must leave something to it.
+TEST_F(TableSourceTest, TooLittleIsInsufficient) {
+  std::string csv = "b,g,x,y\n";
+  for (int r = 0; r < 96; ++r)
+    csv += fmt::format("{},{},{},{}\n", r / 8, r % 48, even(random), 5 + 0.1 * scatter(random));
+  const std::string response = "[response]\ncolumn = \"y\"\nunit = \"N\"\n";
+  Explanation e = explained(observed(csv, "blocks = \"b\"\nhold_out = \"b > 0\"\n" + response));
+  EXPECT_EQ(e.verdict, "insufficient");
+  EXPECT_THAT(e.warnings, Contains(HasSubstr("hold_out leaves 1 block")));
+  e = explained(observed(csv, "groups = [\"g\"]\nblocks = \"b\"\nhold_out = \"b > 5\"\n" + response));
+  EXPECT_EQ(e.verdict, "insufficient");
+  EXPECT_THAT(e.warnings, Contains(HasSubstr("nothing is left to explain")));
 }
 
 }  // namespace
