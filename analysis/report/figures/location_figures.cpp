@@ -58,7 +58,7 @@ Figure location_figure(const Material& material, double width_mm, const char* na
   std::string script = look() + sheet.axes(box, tunnel ? kHeightTitle : "", axis, kLeftTitle_mm);
   std::vector<LegendEntry> entries;
   for (std::size_t c = 0; c < columns.size(); ++c) entries.push_back(look_of(columns, c));
-  script += legend(sheet, entries, sheet.height_mm - 2.5, kAcross, kPlotLeft_mm);
+  script += legend(sheet, entries, sheet.height_mm - 2.5, kAcross, kLegendLeft_mm);
   script += tunnel ? by_height(columns, value) : side_by_side(*material.summary, value);
   return {
       name, sheet, script,

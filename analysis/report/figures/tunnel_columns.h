@@ -8,8 +8,9 @@
 
 namespace tunnelrig::report {
 
-constexpr double kPlotLeft_mm = 16, kPlotRight_mm = 2,
-                 kLeftTitle_mm = 13;  // of a plot with five digits at its axis
+constexpr double kPlotLeft_mm = 17.5, kPlotRight_mm = 2,
+                 kLeftTitle_mm = 14.8,  // of a plot with five digits at its axis
+    kLegendLeft_mm = 8;
 constexpr const char* kHeightTitle = "← ground    z̄ = 2z/(h_t − h_q) [–]    ceiling →";
 
 /// Locations of one distance from the middle plane, from the ground upwards.
