@@ -153,7 +153,7 @@ std::string verdict_in_words(const std::string& verdict) {
   if (verdict == "unknown")
     return "There is structure, but no candidate accounts for it: the cause is not known.";
   if (verdict == "no_structure") return "Nothing beyond chance was found.";
-  return "There are too few blocks to say anything.";
+  return "There are too few blocks, or runs, to say anything.";
 }
 
 std::string explanation_json(const Explanation& e) {
