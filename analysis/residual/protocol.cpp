@@ -259,7 +259,7 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
         "hold out others");
   const auto with_interval = [&](const HeldOutErrors& sealed, const Observations& data, const JointFit& fit,
                                  const NullFit& variances, ErrorEstimate& estimate) {
-    set_interval(alone, sealed, left_out(data, fit, variances, seal.open), settings.seed, estimate);
+    set_interval(models.alone, sealed, left_out(data, fit, variances, seal.open), settings.seed, estimate);
   };
   with_interval(before, alone, found.baseline, named.variances, explanation.before);
   with_interval(after, wide, shown, shown.variances, explanation.after);
