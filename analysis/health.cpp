@@ -1,5 +1,6 @@
 #include "analysis/health.h"
 
+#include "analysis/reduction.h"
 #include "datasets/error.h"
 #include "datasets/first_few.h"
 
@@ -32,7 +33,10 @@ class Names {
 
 class Examination {
  public:
-  Examination(const CampaignFile& file, const CampaignData& data) : file_(file), data_(data) {}
+  Examination(const CampaignFile& file, const CampaignData& data) : file_(file), data_(data) {
+    for (const Run& run : data.runs)
+      if (!run.excluded.empty()) excluded_.insert(run.run);
+  }
 
   std::vector<Finding> take() { return std::move(findings_); }
 
@@ -53,6 +57,7 @@ class Examination {
       try {
         const std::string hash = hash_of(run);
         if (!run.hash.empty() && hash != run.hash) changed.add(name);
+        if (excluded_.contains(name)) continue;
         const auto [known, fresh] = first.emplace(hash, name);
         if (!fresh && run.frames > 0) alike.add(fmt::format("{} and {}", known->second, name));
       } catch (const StorageError&) {
@@ -164,10 +169,10 @@ class Examination {
 
   void tares() {
     std::set<std::string> tared, all;
-    for (const Run& run : data_.runs) {
-      if (!data_.raw.contains(run.run)) continue;
-      (run.kind == RunKind::kTare ? tared : all).insert(run.session);
-    }
+    for (const std::size_t tare : tare_runs(data_)) tared.insert(data_.runs[tare].session);
+    for (const Run& run : data_.runs)
+      if (run.kind == RunKind::kThrust && run.excluded.empty() && data_.raw.contains(run.run))
+        all.insert(run.session);
     Names without;
     for (const std::string& session : all) {
       if (!tared.contains(session)) without.add(session);
@@ -186,7 +191,7 @@ class Examination {
     Names stuck, dead, clipped, overloaded;
     for (const Run& run : data_.runs) {
       const auto statistics = data_.statistics.find(run.run);
-      if (statistics == data_.statistics.end()) continue;
+      if (statistics == data_.statistics.end() || !run.excluded.empty()) continue;
       const auto raw = data_.raw.find(run.run);
       const bool counts = raw != data_.raw.end() && is_counts(raw->second.format.type);
       for (int rotor = 0; rotor < data_.info.rig.rotors; ++rotor) {
@@ -232,7 +237,7 @@ class Examination {
            Severity::kNote}}) {
       Names missing;
       for (const Run& run : data_.runs) {
-        if (run.kind == RunKind::kThrust && !run.number(column)) missing.add(run.run);
+        if (run.kind == RunKind::kThrust && run.excluded.empty() && !run.number(column)) missing.add(run.run);
       }
       if (missing.empty()) continue;
       findings_.push_back(
@@ -245,7 +250,7 @@ class Examination {
     const double nominal = data_.info.rig.nominal_speed_rpm;
     for (const Run& run : data_.runs) {
       const auto read = run.number("speed_rpm");
-      if (run.kind != RunKind::kThrust || !read) continue;
+      if (run.kind != RunKind::kThrust || !read || !run.excluded.empty()) continue;
       if (std::abs(*read / nominal - 1) > kSpeedTolerance)
         off.add(fmt::format("{} ({:.0f})", run.run, *read));
       const auto statistics = data_.statistics.find(run.run);
@@ -268,6 +273,7 @@ class Examination {
   void drifts() {
     Names moving;
     for (const auto& [name, statistics] : data_.statistics) {
+      if (excluded_.contains(name)) continue;
       const bool still = std::all_of(statistics.channels.begin(), statistics.channels.end(),
                                      [](const auto& channel) { return channel.stationary(); });
       if (!still) moving.add(name);
@@ -331,6 +337,7 @@ class Examination {
 
   const CampaignFile& file_;
   const CampaignData& data_;
+  std::set<std::string> excluded_;  // runs; nothing is derived from them
   std::vector<Finding> findings_;
 };
 

@@ -168,7 +168,7 @@ void add_propellers(const CampaignData& data, const Grouping& grouping, const Re
                                   propellers.covariance, propellers.dof, [&](const RunCoefficients& run) {
                                     Eigen::MatrixXd slope =
                                         Eigen::MatrixXd::Zero(data.info.rig.rotors, data.info.rig.rotors);
-                                    for (Eigen::Index i = 0; i < slope.rows(); ++i) {
+                                    for (Eigen::Index i = 0; run.from_volts && i < slope.rows(); ++i) {
                                       slope(i, i) =
                                           -run.thrust_N[static_cast<std::size_t>(i)] / propellers.factor(i);
                                     }
@@ -271,9 +271,24 @@ void note_components(const VarianceComponents& components, const Reduction& redu
                            : "repeatability: no location was repeated and there are no raw data, so how far "
                              "C_T and U scatter is not known");
   }
-  if (!components.session_known) {
+  if (!components.session_known && !components.run_known && components.visit_known) {
+    notes.emplace_back(
+        "sessions: what runs and sessions scatter cannot be told apart, and is taken as one, of each visit's "
+        "own");
+  } else if (!components.session_known) {
     notes.emplace_back("sessions: no location was measured in two sessions, so their scatter is left out");
   }
+}
+
+/// What the locations' own scatter is; the noise within runs where repeats tell nothing of it.
+double own_variance(double of_means, double noise_variance) {
+  return of_means > 0 ? of_means : noise_variance;
+}
+
+Eigen::MatrixXd with_noise(Eigen::MatrixXd covariance, const std::vector<double>& noise_variance) {
+  for (Eigen::Index l = 0; l < covariance.rows(); ++l)
+    covariance(l, l) = own_variance(covariance(l, l), noise_variance[static_cast<std::size_t>(l)]);
+  return covariance;
 }
 
 /// One quantity at one location from all its parts.
@@ -283,7 +298,7 @@ LocationValue combine(const LocationMeans& means, std::size_t l, double noise_va
   LocationValue value{.mean = means.mean[l], .std = means.std[l]};
   double variance = means.covariance(row, row);
   double over_dof = variance > 0 && std::isfinite(means.dof[l]) ? variance * variance / means.dof[l] : 0;
-  if (variance <= 0) variance = noise_variance;
+  variance = own_variance(variance, noise_variance);
   const bool known = variance > 0;  // without repeats and raw data instruments alone would look exact
   for (const SharedSource& source : sources) {
     const Eigen::RowVectorXd slope = (source.*slopes).row(row);
@@ -363,8 +378,8 @@ Summary summarize_locations(const CampaignData& data, const Reduction& reduction
     if (has_u) location.u_percent = combine(u_scatter.means, l, noise_u[l], sources, &SharedSource::u);
     location.budget = budget_of(c_t_scatter.means, c_t_scatter.components, l, noise_c_t[l], sources);
   }
-  summary.c_t_covariance = c_t_scatter.means.covariance;
-  summary.u_covariance = has_u ? u_scatter.means.covariance : Eigen::MatrixXd(0, 0);
+  summary.c_t_covariance = with_noise(c_t_scatter.means.covariance, noise_c_t);
+  summary.u_covariance = has_u ? with_noise(u_scatter.means.covariance, noise_u) : Eigen::MatrixXd(0, 0);
   for (const SharedSource& source : sources) {
     summary.c_t_covariance += source.c_t * source.covariance * source.c_t.transpose();
     if (has_u) summary.u_covariance += source.u * source.covariance * source.u.transpose();

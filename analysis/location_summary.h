@@ -40,7 +40,7 @@ struct LocationSummary {
   std::optional<double> y_norm, z_norm;
   int runs = 0, sessions = 0;
   LocationValue c_t, u_percent;
-  std::vector<double> c_rotor;  // C_T of each rotor alone
+  std::vector<double> c_rotor;  // C_T of each rotor alone, over one disc: they add up to the mean C_T
   double thrust_N = 0;          // mean total
   Budget budget;
 };

@@ -20,11 +20,11 @@ double required(const Run& run, std::string_view column, std::string_view term) 
                        term);
 }
 
-/// ρ and Ω of a run by the model; nothing where its temperature was not recorded.
-bool set_conditions(const Run& run, const CampaignInfo& info, const ModelTerms& terms,
-                    RunCoefficients& result) {
+/// ρ and Ω of a run by the model. Returns why there are none; empty where there are.
+std::string set_conditions(const Run& run, const CampaignInfo& info, const ModelTerms& terms,
+                           RunCoefficients& result) {
   const auto celsius = run.number("air_temperature_C");
-  if (!celsius) return false;
+  if (!celsius) return "air_temperature_C was not recorded, so there is no density";
   result.temperature_K = *celsius + kZeroCelsius_K;
   const double pressure_Pa =
       terms.air_pressure ? required(run, "air_pressure_Pa", "air_pressure") : thesis::kPressure_Pa;
@@ -34,12 +34,13 @@ bool set_conditions(const Run& run, const CampaignInfo& info, const ModelTerms& 
                              : dry_air_density_kg_m3(pressure_Pa, result.temperature_K);
   result.speed_rpm =
       terms.rotor_speed ? required(run, "speed_rpm", "rotor_speed") : info.rig.nominal_speed_rpm;
-  return true;
+  return result.speed_rpm > 0 ? "" : "speed_rpm is 0, so there is no C_T";
 }
 
 void read_thrusts_from_volts(const CampaignData& data, const Run& run, const RunStatistics& statistics,
                              const Certificate& certificate, const Tares& tares, RunCoefficients& result) {
   const double frames = static_cast<double>(statistics.frames);
+  result.from_volts = true;
   result.tare = tares.zero_at(run.session, run.start_s + 0.5 * frames / data.info.daq.sample_rate_hz);
   for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
     const auto i = static_cast<std::size_t>(rotor);
@@ -189,8 +190,8 @@ Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms) {
     if (run.kind == RunKind::kTare) continue;
     RunCoefficients result;
     result.run = r;
-    if (!set_conditions(run, data.info, terms, result)) {
-      reduction.left_out.push_back({run.run, "air_temperature_C was not recorded, so there is no density"});
+    if (const std::string reason = set_conditions(run, data.info, terms, result); !reason.empty()) {
+      reduction.left_out.push_back({run.run, reason});
       continue;
     }
     if (const auto raw = data.raw.find(run.run); raw != data.raw.end()) {

@@ -47,6 +47,7 @@ struct RunCoefficients {
   std::vector<std::array<double, kMaxRotors>> d_parameter_N;  // by the adopted model's parameters
   std::optional<TareZero> tare;
 
+  bool from_volts = false;  // else from the sheet, as they are there
   bool zero_from_calibration = false;
   bool extrapolated = false;
   bool stationary = true;

@@ -48,7 +48,13 @@ Json value_json(const LocationValue& value, double factor) {
           {"u95", maybe(factor * value.u95)}};
 }
 
-Json location_json(const LocationSummary& location, double factor, bool has_u) {
+/// Of one rotor's coefficient. The thesis's are shares of the total, over one disc; the other conventions
+/// are of one rotor, and the total's is their mean.
+double rotor_factor(double factor, Convention convention, const Rig& rig) {
+  return convention == Convention::kThesis ? factor : factor * rig.rotors;
+}
+
+Json location_json(const LocationSummary& location, double factor, double of_rotor, bool has_u) {
   Json json{{"location", location.label}, {"runs", location.runs}, {"sessions", location.sessions}};
   if (location.y_norm) json["y_norm"] = *location.y_norm;
   if (location.z_norm) json["z_norm"] = *location.z_norm;
@@ -57,7 +63,7 @@ Json location_json(const LocationSummary& location, double factor, bool has_u) {
   if (has_u) json["u_percent"] = value_json(location.u_percent, 1);
   for (const BudgetPart& part : kBudget)
     json["c_t_budget"][part.name] = factor * (location.budget.*part.value);
-  for (const double value : location.c_rotor) json["c_rotor"].push_back(factor * value);
+  for (const double value : location.c_rotor) json["c_rotor"].push_back(of_rotor * value);
   return json;
 }
 
@@ -76,12 +82,13 @@ std::string locations_csv(const Summary& summary, const Reduction& reduction, co
   csv += ",convention,model\n";
   for (const LocationSummary& location : summary.locations) {
     const auto u_cell = [&](double value) { return has_u ? cell(value, "{:.6f}") : std::string(); };
-    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", location.label, cell(location.y_norm),
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", csv_cell(location.label), cell(location.y_norm),
                        cell(location.z_norm), location.runs, cell(factor * location.c_t.mean),
                        cell(factor * location.c_t.std), cell(factor * location.c_t.u95),
                        u_cell(location.u_percent.mean), u_cell(location.u_percent.std),
                        u_cell(location.u_percent.u95), location.sessions, cell(location.thrust_N));
-    for (const double value : location.c_rotor) csv += "," + cell(factor * value);
+    for (const double value : location.c_rotor)
+      csv += "," + cell(rotor_factor(factor, convention, rig) * value);
     csv += "," + cell(location.c_t.dof, "{:.1f}");
     for (const BudgetPart& part : kBudget)
       csv += "," + cell(factor * (location.budget.*part.value), "{:.4g}");
@@ -97,9 +104,9 @@ std::string runs_csv(const CampaignData& data, const Reduction& reduction, Conve
   csv += ",c_t_standard_error,stationary,clipped,zero_from_calibration,convention,model\n";
   for (const RunCoefficients& reduced : reduction.runs) {
     const Run& run = data.runs[reduced.run];
-    csv += fmt::format("{},{},{},{},{},{},{},{:.6f},{:.1f}", run.run, run.location, run.repeat, run.session,
-                       format_utc(run.start_s), cell(factor * reduced.c_t), cell(reduced.u_percent, "{:.6f}"),
-                       reduced.density_kg_m3, reduced.speed_rpm);
+    csv += fmt::format("{},{},{},{},{},{},{},{:.6f},{:.1f}", csv_cell(run.run), csv_cell(run.location),
+                       run.repeat, csv_cell(run.session), format_utc(run.start_s), cell(factor * reduced.c_t),
+                       cell(reduced.u_percent, "{:.6f}"), reduced.density_kg_m3, reduced.speed_rpm);
     for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
       csv += fmt::format(",{:.6f}", reduced.thrust_N[static_cast<std::size_t>(rotor)]);
     }
@@ -119,7 +126,9 @@ std::string reduction_json(const CampaignData& data, const Reduction& reduction,
             {"runs", reduction.runs.size()}};
   json["locations"] = Json::array();
   for (const LocationSummary& location : summary.locations) {
-    json["locations"].push_back(location_json(location, factor, data.info.rig.rotors == kMaxRotors));
+    json["locations"].push_back(location_json(location, factor,
+                                              rotor_factor(factor, convention, data.info.rig),
+                                              data.info.rig.rotors == kMaxRotors));
   }
   json["left_out"] = Json::array();
   for (const LeftOutRun& run : reduction.left_out) {

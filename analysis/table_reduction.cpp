@@ -68,11 +68,6 @@ void finish_group(TableReduction& reduction, TableGroup& group) {
   group.at_highest = reduction.rows[group.rows.back()].c_t;
 }
 
-std::string quoted(std::string text) {
-  std::replace(text.begin(), text.end(), '"', '\'');
-  return '"' + text + '"';
-}
-
 /// Many groups get thin lines of one colour and no legend; a handful get a legend.
 std::string plot_script(const TableReduction& reduction, const std::string& terminal,
                         const std::string& output) {
@@ -84,14 +79,14 @@ std::string plot_script(const TableReduction& reduction, const std::string& term
       "set terminal {}\nset output {}\nset encoding utf8\nset xlabel 'speed [rev/min]'\n"
       "set ylabel 'C_T ({} convention)'\nset title {} noenhanced\nset grid lc rgb '#dddddd'\n{}\nset yrange "
       "[{}:*]\nplot ",
-      terminal, quoted(output), name_of(reduction.convention), quoted(reduction.name),
+      terminal, gnuplot_text(output), name_of(reduction.convention), gnuplot_text(reduction.name),
       legend ? "set key outside right noenhanced" : "unset key", pulls ? "*" : "0");
   std::string data;
   for (std::size_t g = 0; g < reduction.groups.size(); ++g) {
     script +=
         fmt::format("{}'-' using 1:2 with linespoints pt 7 ps 0.4 lw {} {} title {}", g == 0 ? "" : ", ",
                     legend ? "1.5" : "0.7", legend ? fmt::format("lt {}", g + 1) : "lc rgb '#800072b2'",
-                    quoted(reduction.groups[g].name));
+                    gnuplot_text(reduction.groups[g].name));
     for (const std::size_t row : reduction.groups[g].rows)
       data += fmt::format("{} {}\n", reduction.rows[row].speed_rpm, reduction.rows[row].c_t);
     data += "e\n";

@@ -231,7 +231,11 @@ VarianceComponents fit_variance_components(const GroupedRuns& runs) {
   const std::size_t for_sessions = design.sessions - 1;
   components.session_known = freedom >= 1 && for_sessions >= 1;
   components.visit_known = freedom > for_sessions;
-  if (!components.run_known && !components.visit_known) components.session_known = false;
+  if (!components.run_known && !components.visit_known) {
+    // As many visits beyond the first as sessions: all that is known is what the three make together.
+    components.visit_known = freedom >= 1;
+    components.session_known = false;
+  }
   if (!components.session_known && !components.visit_known) return components;
 
   double squares = 0;

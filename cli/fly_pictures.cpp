@@ -84,9 +84,12 @@ std::vector<std::filesystem::path> draw_flown(const std::filesystem::path& folde
   std::filesystem::create_directories(scratch);
   std::string script = data_blocks(flown, task, shown);
   std::vector<std::filesystem::path> files;
-  const auto title = fmt::format(
-      "set title '{}, {} tunnel, first run (simulated){}' noenhanced\n", flown.scenario, flown.tunnel,
-      shown < flown.logs.size() ? fmt::format("; the first {} controllers", shown) : "");
+  const std::string title =
+      "set title " +
+      gnuplot_text(
+          fmt::format("{}, {} tunnel, first run (simulated){}", flown.scenario, flown.tunnel,
+                      shown < flown.logs.size() ? fmt::format("; the first {} controllers", shown) : "")) +
+      " noenhanced\n";
   const auto add = [&](const char* name, const std::string& plot, int width, int height) {
     for (const char* format : {"svg", "png"}) {
       const bool png = std::string_view(format) == "png";

@@ -5,6 +5,8 @@
 #include "cli/verb.h"
 #include "datasets/error.h"
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include <fmt/format.h>
@@ -68,9 +70,19 @@ int run_map(const MapOptions& options) {
           {program_version(), arguments(),
            nlohmann::json{{"calibration", data.certificate_id}, {"model", reduction.model.version}}.dump()},
           format_disturbance_map(written.map));
+  bool problem = false;
   for (const LeftOutRun& run : reduction.left_out) {
-    if (run.reason.starts_with("excluded")) warn(fmt::format("run {} is left out: {}", run.run, run.reason));
+    problem = problem || run.problem;
+    if (run.problem || run.reason.starts_with("excluded"))
+      warn(fmt::format("run {} is left out: {}", run.run, run.reason));
   }
+  if (std::ranges::any_of(summary.locations, [](const LocationSummary& location) {
+        return std::isnan(location.c_t.standard_uncertainty);
+      }))
+    warn(
+        "how far C_T and U scatter is not known (no location was repeated, and there are no raw data): the "
+        "maps' "
+        "uncertainty is without it");
   if (written.warning) warn(*written.warning);
   if (options.json) {
     nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},
@@ -85,7 +97,7 @@ int run_map(const MapOptions& options) {
     print(written);
     fmt::print("model {}\n", reduction.model_name());
   }
-  return kWell;
+  return problem ? kProblemFound : kWell;
 }
 
 }  // namespace

@@ -236,20 +236,19 @@ Sheet read_csv(const std::filesystem::path& path, std::string_view free_text) {
   return parse_csv(read_text(path), path.string(), free_text);
 }
 
+std::string csv_cell(std::string_view text) {
+  // A byte order mark that belongs to the text must not come to stand at the start of the file.
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos && !text.starts_with(kByteOrderMark))
+    return std::string(text);
+  std::string out = "\"";
+  for (const char c : text) out.append(c == '"' ? 2 : 1, c);
+  return out + "\"";
+}
+
 std::string format_csv(const Sheet& sheet) {
   std::string out;
   const auto append = [&out](const std::vector<std::string>& cells) {
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (i > 0) out.push_back(',');
-      // A byte order mark that belongs to the text must not come to stand at the start of the file.
-      if (cells[i].find_first_of(",\"\r\n") == std::string::npos && !cells[i].starts_with(kByteOrderMark)) {
-        out += cells[i];
-        continue;
-      }
-      out.push_back('"');
-      for (const char c : cells[i]) out.append(c == '"' ? 2 : 1, c);
-      out.push_back('"');
-    }
+    for (std::size_t i = 0; i < cells.size(); ++i) out += (i > 0 ? "," : "") + csv_cell(cells[i]);
     out.push_back('\n');
   };
   append(sheet.columns);
@@ -286,6 +285,14 @@ namespace {
   throw InputError::in(path.string(), "cannot be written: {}", reason);
 }
 
+/// A campaign file is what nobody means to write a table over.
+bool is_data_base(const std::filesystem::path& path) {
+  constexpr std::string_view kMagic = "SQLite format 3";
+  std::string begins(kMagic.size(), '\0');
+  std::ifstream in(path, std::ios::binary);
+  return in.read(begins.data(), static_cast<std::streamsize>(begins.size())) && begins == kMagic;
+}
+
 bool put(const std::filesystem::path& path, std::string_view text) {
   std::ofstream out(path, std::ios::binary);
   out.write(text.data(), static_cast<std::streamsize>(text.size()));
@@ -305,6 +312,7 @@ void write_text(const std::filesystem::path& path, std::string_view text) {
   constexpr int kMostLinks = 40;
   for (int links = 0; links < kMostLinks && std::filesystem::is_symlink(target, error); ++links)
     target = target.parent_path() / std::filesystem::read_symlink(target, error);
+  if (is_data_base(target)) cannot_write(path, "it is a campaign file; write to another name");
   std::filesystem::path partial = target;
   partial += fmt::format(".{}.part", ::getpid());
   const bool whole = put(partial, text);

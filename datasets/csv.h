@@ -62,6 +62,9 @@ Sheet parse_csv(std::string_view text, const std::string& file, std::string_view
 /// Reads and parses a file; messages name its path as given.
 Sheet read_csv(const std::filesystem::path& path, std::string_view free_text = {});
 
+/// A text as a cell of a CSV: in quotes where it needs them.
+std::string csv_cell(std::string_view text);
+
 /// RFC 4180 text of the sheet, quoting only the cells that need it, lines ending in \n.
 std::string format_csv(const Sheet& sheet);
 
@@ -80,7 +83,7 @@ std::string read_text(const std::filesystem::path& path);
 
 /// Writes a text file through a temporary one and a rename, so that it is whole or absent. Where the path
 /// leads to a device or a pipe, that takes the text; where it is a link to a file, the link stays. Throws
-/// InputError where it cannot be written.
+/// InputError where it cannot be written, and where a campaign file is in the way.
 void write_text(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace tunnelrig

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kLines = 1 << 20;   // bytes that are passed on at a time
 constexpr std::size_t kLongestCell = 32;  // of a number, with its comma
 
-std::string text_of(double value) { return std::isnan(value) ? std::string() : fmt::format("{}", value); }
+std::string text_of(double value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string(); }
 std::string text_of(std::int64_t value) { return fmt::format("{}", value); }
 std::string text_of(std::uint8_t value) { return value != 0 ? "1" : "0"; }
 std::string text_of(const std::string& value) { return value; }

@@ -43,6 +43,17 @@ std::string last_line(const std::string& text) {
 
 }  // namespace
 
+std::string gnuplot_text(std::string_view text) {
+  std::string out = "'";
+  for (const char c : text) {
+    if (static_cast<unsigned char>(c) < ' ')
+      out += ' ';
+    else
+      out += c == '\'' ? std::string("''") : std::string(1, c);
+  }
+  return out + "'";
+}
+
 std::optional<std::string> run_gnuplot(const std::string& program, const std::filesystem::path& folder,
                                        const std::string& script) {
   write_text(folder / "script", script);

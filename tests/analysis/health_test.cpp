@@ -120,5 +120,22 @@ TEST_F(Health, OneRecordingOfTwoRuns) {
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("raw data: the same frames in R1 and R2"));
 }
 
+TEST_F(Health, WhatIsExcludedIsNotHeldAgainstTheRest) {
+  campaign.runs_csv.replace(campaign.runs_csv.find("raw/R2.npy"), 10, "raw/R1.npy");
+  const auto header = campaign.runs_csv.find('\n');
+  std::string excluded = campaign.runs_csv.substr(0, header) + ",excluded\n";
+  std::size_t from = header + 1;
+  while (from < campaign.runs_csv.size()) {
+    const auto end = campaign.runs_csv.find('\n', from);
+    const std::string row = campaign.runs_csv.substr(from, end - from);
+    excluded += row + (row.starts_with("R2,") ? ",wrong file\n" : ",\n");
+    from = end + 1;
+  }
+  campaign.runs_csv = excluded;
+  import();
+  calibrate_file();
+  EXPECT_EQ(found(Severity::kProblem), "");
+}
+
 }  // namespace
 }  // namespace tunnelrig

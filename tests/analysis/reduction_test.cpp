@@ -166,5 +166,81 @@ TEST(ReductionOutput, CsvColumnsAreInTheirOrderAndEmptyMeansNotKnown) {
   EXPECT_EQ(sheet.require_number(0, "y_norm"), 0);
 }
 
+TEST(Reduction, ASpeedOfZeroHasNoC_T) {
+  const CampaignData data = given_thrusts(
+      "R1,OT,1,S1,2026-03-02T08:00Z,,7,7,7,7,20,,,0\nR2,OT,2,S1,2026-03-02T09:00Z,,7,7,7,7,20,,,5000\n");
+  EXPECT_EQ(reduce_runs(data, {}).runs.size(), 2u) << "the thesis takes the nominal one";
+  const Reduction reduction = reduce_runs(data, terms_from_names("rotor_speed"));
+  ASSERT_EQ(reduction.left_out.size(), 1u);
+  EXPECT_THAT(reduction.left_out[0].reason, HasSubstr("speed_rpm is 0"));
+}
+
+/// Propellers' factors are divided out of what cells read; thrusts of the sheet are as they are.
+TEST(Locations, ThrustsOfTheSheetHaveNoPropellersUncertainty) {
+  CampaignData data = given_thrusts(
+      "R1,OT,1,S1,2026-03-02T08:00Z,,7.1,7.4,7.6,7.2,20,,,\nR2,OT,2,S1,2026-03-02T09:00Z,,7.2,7.3,7.5,7.3,20,"
+      ",,\n");
+  std::vector<CalibrationPoint> points;
+  std::vector<PropellerTest> tests;
+  for (int rotor = 1; rotor <= 4; ++rotor)
+    for (int p = 0; p < 5; ++p) {
+      points.push_back({.cell = rotor,
+                        .applied_force_N = 2.0 * p,
+                        .voltage_V = 0.3 + 0.5 * p + 1e-4 * (p % 2),
+                        .line = p + 2});
+      tests.push_back({.propeller = std::string(1, static_cast<char>('A' + rotor)),
+                       .rotor = rotor,
+                       .direction = rotor < 3 ? "CCW" : "CW",
+                       .thrust_N = 7.4 + 0.1 * p,
+                       .line = p + 2});
+    }
+  const double alone = summarize_locations(data, reduce_runs(data, {})).locations[0].u_percent.u95;
+  data.certificate = calibrate(points, tests);
+  const LocationSummary location = summarize_locations(data, reduce_runs(data, {})).locations[0];
+  EXPECT_EQ(location.budget.propellers, 0);
+  EXPECT_DOUBLE_EQ(location.u_percent.u95, alone);
+}
+
+/// An anchor once a session, every other place once: what runs and sessions scatter is known together.
+TEST(Locations, AnAnchorTellsWhatSinglesScatter) {
+  std::string rows;
+  int run = 0;
+  for (int session = 1; session <= 4; ++session)
+    for (const char* place : {"OT", "", ""}) {
+      const double thrust = 7 + 0.1 * (session % 3) + 0.02 * run;
+      rows += fmt::format("R{},{},1,S{},2026-03-0{}T08:{:02}Z,,{},{},{},{},20,,,\n", run,
+                          *place != '\0' ? std::string(place) : fmt::format("H1V{}", run - 6), session,
+                          session, run % 60, thrust, thrust, thrust, thrust);
+      ++run;
+    }
+  const CampaignData data = given_thrusts(rows);
+  const Summary summary = summarize_locations(data, reduce_runs(data, {}));
+  for (const LocationSummary& location : summary.locations) {
+    EXPECT_GT(location.c_t.u95, 0.3 * summary.locations[0].c_t.std) << location.label;
+    if (location.label == "OT") {
+      EXPECT_GT(location.c_t.u95, 1.2 * location.c_t.std);
+    }
+  }
+  EXPECT_THAT(testing::PrintToString(summary.notes), HasSubstr("cannot be told apart"));
+}
+
+TEST(ReductionOutput, RotorsAverageToC_TOfOneRotorAndTextsKeepToTheirCells) {
+  CampaignData data = given_thrusts(
+      "R1,\"on the \"\"left\"\", low\",1,S1,2026-03-02T08:00Z,,7.1,7.4,7.6,7.2,20,,,\n"
+      "R2,\"on the \"\"left\"\", low\",2,S1,2026-03-02T09:00Z,,7.2,7.3,7.5,7.3,20,,,\n");
+  const Reduction reduction = reduce_runs(data, {});
+  const Summary summary = summarize_locations(data, reduction);
+  for (const Convention convention : {Convention::kThesis, Convention::kHelicopter, Convention::kPropeller}) {
+    const Sheet sheet =
+        parse_csv(locations_csv(summary, reduction, data.info.rig, convention), "locations.csv");
+    EXPECT_EQ(sheet.text(0, "location"), "on the \"left\", low");
+    double sum = 0;
+    for (int rotor = 1; rotor <= 4; ++rotor) sum += *sheet.number(0, fmt::format("c_rotor_{}", rotor));
+    EXPECT_NEAR(sum / (convention == Convention::kThesis ? 1 : 4), *sheet.number(0, "c_t"), 1e-6);
+  }
+  EXPECT_EQ(parse_csv(runs_csv(data, reduction, Convention::kThesis), "runs.csv").text(1, "location"),
+            "on the \"left\", low");
+}
+
 }  // namespace
 }  // namespace tunnelrig

@@ -196,5 +196,22 @@ TEST_F(BadInput, OutputThatCannotBeWritten) {
   }
 }
 
+/// gnuplot runs what stands in backquotes, if it stands in double quotes.
+TEST_F(BadInput, NamesInATableAreNoCommands) {
+  write_text(folder / "t.csv",
+             "g,N,y\n`touch ran`,3000,0.1\n`touch ran`,4000,0.11\nb,3000,0.1\nb,3500,0.12\n");
+  write_text(
+      folder / "t.toml",
+      "format = \"tunnelrig-table/1\"\nname = \"`touch ran`\"\ngroups = [\"g\"]\n[response]\ncolumn = \"y\"\n"
+      "unit = \"1\"\nmeaning = \"c_t_propeller\"\n[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n");
+  ASSERT_EQ(test::run_program(folder.path(), "import t.csv --format table --schema t.toml --db t.db").code,
+            0);
+  write_text(folder / "script", "mine");
+  ASSERT_EQ(test::run_program(folder.path(), "reduce --db t.db --plot t.svg").code, 0);
+  EXPECT_FALSE(fs::exists(folder / "ran"));
+  EXPECT_EQ(read_text(folder / "script"), "mine");
+  EXPECT_FALSE(fs::exists(folder / "complaint"));
+}
+
 }  // namespace
 }  // namespace tunnelrig

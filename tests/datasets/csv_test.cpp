@@ -91,5 +91,14 @@ TEST(WriteText, KeepsLinksAndDevices) {
             "/dev/full: cannot be written: No space left on device");
 }
 
+TEST(WriteText, NeverOverACampaignFile) {
+  const test::TemporaryFolder folder;
+  const std::string text = "SQLite format 3" + std::string(100, '\0');
+  write_text(folder / "c.db", text);
+  EXPECT_THAT(test::message_of([&] { write_text(folder / "c.db", "a,b\n"); }),
+              testing::HasSubstr("it is a campaign file"));
+  EXPECT_EQ(read_text(folder / "c.db"), text);
+}
+
 }  // namespace
 }  // namespace tunnelrig

@@ -132,17 +132,6 @@ std::string legend(const Sheet& sheet, const std::vector<LegendEntry>& entries, 
   return text;
 }
 
-std::string gnuplot_text(std::string_view text) {
-  std::string out = "'";
-  for (const char c : text) {
-    if (static_cast<unsigned char>(c) < ' ')
-      out += ' ';
-    else
-      out += c == '\'' ? std::string("''") : std::string(1, c);
-  }
-  return out + "'";
-}
-
 std::string completed(std::string file, const Sheet& sheet, FigureFormat format) {
   if (format == FigureFormat::kPng) {
     constexpr std::size_t kHeaderEnd = 8 + 4 + 4 + 13 + 4;  // signature, and the chunk IHDR

@@ -1,6 +1,7 @@
 // The sheet that a figure is drawn on, in millimetres and points. Internal to analysis/report/figures.
 #pragma once
 
+#include "analysis/maps/gnuplot.h"
 #include "analysis/report/figures/write_figures.h"
 
 #include <string>
@@ -63,9 +64,6 @@ std::string legend(const Sheet& sheet, const std::vector<LegendEntry>& entries, 
 
 /// Between panels of one sheet: what was written on it is not written again.
 constexpr const char* kNextPanel = "unset label\nunset arrow\n";
-
-/// Text for gnuplot in single quotes, whatever it holds; to be drawn with `noenhanced` where it is a user's.
-std::string gnuplot_text(std::string_view text);
 
 /// A drawn file with what gnuplot cannot say itself: an SVG is so many millimetres wide and carries its font,
 /// a PNG has so many dots per metre.
