@@ -70,6 +70,8 @@ std::map<std::string, RunStatistics> statistics_from_raw(
   const CampaignInfo info = overview.info();
   std::vector<RawRun> runs = raw_runs(overview);
   std::erase_if(runs, [](const RawRun& run) { return run.frames == 0; });
+  std::map<std::string, std::optional<double>> speed_rpm;
+  for (const Run& run : overview.runs()) speed_rpm[run.run] = run.number("speed_rpm");
 
   std::map<std::string, RunStatistics> statistics;
   std::mutex mutex;  // guards statistics, failure and progress
@@ -79,7 +81,9 @@ std::map<std::string, RunStatistics> statistics_from_raw(
     try {
       const CampaignFile file(path, CampaignFile::Access::kRead);
       for (std::size_t i = next++; i < runs.size(); i = next++) {
-        RunStatistics result = summarize(file, info, runs[i], with_spectrum);
+        const auto speed = speed_rpm.find(runs[i].run);
+        RunStatistics result = summarize(
+            file, speed == speed_rpm.end() ? info : at_speed(info, speed->second), runs[i], with_spectrum);
         const std::lock_guard lock(mutex);
         statistics.emplace(runs[i].run, std::move(result));
         if (progress) progress(statistics.size(), runs.size());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -191,19 +192,49 @@ double folded(double frequency_hz, double rate_hz) {
   return std::min(rest, rate_hz - rest);
 }
 
-std::string name_of_line(double frequency_hz, double shaft_hz, double rate_hz, double tolerance_hz) {
-  const auto near = [&](double other_hz) { return std::abs(frequency_hz - other_hz) <= tolerance_hz; };
+/// What a line may be, and how far it may be off: what follows from a multiple of the shaft's frequency is k
+/// times as uncertain, and the grid is never quite at its frequency.
+struct Origin {
+  std::string name;
+  double hz, sigma_hz;
+  double rarity;  // −ln of how common it is beside the others
+};
+
+std::vector<Origin> origins(double shaft_hz, double rate_hz, double bin_hz) {
+  constexpr double kError_bins = 0.3, kGrid_Hz = 0.05;
+  constexpr double kOvertone = 1, kAlias = 3, kHarmonic = 0.5;
+  const double error_hz = kError_bins * bin_hz;
+  std::vector<Origin> result;
   for (int k = 1; shaft_hz > 0 && k <= 16; ++k) {
-    if (!near(folded(k * shaft_hz, rate_hz))) continue;
+    const bool alias = k * shaft_hz > rate_hz / 2;
     const std::string base = k == 1 ? "shaft" : k == 2 ? "blade_pass" : fmt::format("shaft_x{}", k);
-    return k * shaft_hz > rate_hz / 2 ? base + "_alias" : base;
+    result.push_back({alias ? base + "_alias" : base, folded(k * shaft_hz, rate_hz),
+                      std::hypot(1, k) * error_hz,
+                      alias   ? kAlias
+                      : k > 2 ? kOvertone
+                              : 0});
   }
-  for (const int mains : {50, 60}) {
-    for (int k = 1; k <= 5; ++k) {
-      if (near(folded(k * mains, rate_hz))) return fmt::format("mains_{}", k * mains);
-    }
+  for (const int mains : {50, 60})
+    for (int k = 1; k <= 5; ++k)
+      result.push_back({fmt::format("mains_{}", k * mains), folded(k * mains, rate_hz),
+                        std::hypot(error_hz, k * kGrid_Hz), k > 1 ? kHarmonic : 0});
+  return result;
+}
+
+/// The likeliest origin within a bin and a half; empty: none is as near.
+std::string name_of_line(double frequency_hz, const std::vector<Origin>& known, double tolerance_hz) {
+  std::string name;
+  double best = -std::numeric_limits<double>::infinity();
+  for (const Origin& origin : known) {
+    const double off_hz = frequency_hz - origin.hz;
+    if (std::abs(off_hz) > tolerance_hz) continue;
+    const double likely =
+        -0.5 * std::pow(off_hz / origin.sigma_hz, 2) - std::log(origin.sigma_hz) - origin.rarity;
+    if (likely <= best) continue;
+    best = likely;
+    name = origin.name;
   }
-  return "";
+  return name;
 }
 
 }  // namespace
@@ -220,9 +251,10 @@ LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double r
     break;
   }
   if (list.lines.size() > kMostLines) list.lines.resize(kMostLines);
-  for (SpectralLine& line : list.lines) {
-    line.name = name_of_line(line.frequency_hz, list.shaft_hz, rate_hz, 1.5 * bin_hz);
-  }
+  const std::vector<Origin> known = origins(list.shaft_hz, rate_hz, bin_hz);
+  for (SpectralLine& line : list.lines)
+    line.name =
+        line.frequency_hz == list.shaft_hz ? "shaft" : name_of_line(line.frequency_hz, known, 1.5 * bin_hz);
   return list;
 }
 

@@ -96,8 +96,10 @@ int Logging::record(const PlannedRun& planned, const std::string& note, const Lo
 
   const LogSettings settings{
       .duration_s = planned.duration_s, .capture = options_.capture, .watcher = watch.frames};
-  const auto summarizer = [](const CampaignInfo& info, const RawFormat& format) {
-    return make_run_summarizer(info, format);
+  const auto measured = std::ranges::find(conditions_, "speed_rpm", &RunCells::value_type::first);
+  const auto summarizer = [&](const CampaignInfo& info, const RawFormat& format) {
+    return make_run_summarizer(
+        measured == conditions_.end() ? info : at_speed(info, parse_number(measured->second)), format);
   };
   LogOutcome outcome;
   {

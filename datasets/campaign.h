@@ -122,6 +122,9 @@ struct Run {
   bool in_tunnel() const { return y_norm.has_value() && z_norm.has_value(); }
 };
 
+/// The same campaign at the speed that a run was measured at, where it was: its shaft is looked for there.
+CampaignInfo at_speed(CampaignInfo campaign, std::optional<double> measured_rpm);
+
 /// Why a column of runs.csv cannot hold a value, in words: its range, and the unit that is meant. Empty where
 /// it can; any number can stand in a column that the suite does not know.
 std::string outside_range(std::string_view column, double value);

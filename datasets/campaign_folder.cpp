@@ -170,7 +170,7 @@ class RawImport {
     check_samples(raw->npy, info_, run);
     raw->gaps = read_gaps(gaps_path(path), raw->npy.frames());
     const RawFormat format = raw->npy.format();
-    raw->summarizer = options_.summarizer(info_, format);
+    raw->summarizer = options_.summarizer(at_speed(info_, run.number("speed_rpm")), format);
     raw->statistics = std::async(std::launch::async, [&work = *raw, frame = format.frame_size()] {
       play(work.npy.data(), frame, work.gaps, *work.summarizer);
       return work.summarizer->finish("");

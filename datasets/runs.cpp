@@ -208,6 +208,11 @@ void check_source(const Sheet& sheet, const Run& run, const CampaignInfo& campai
 
 }  // namespace
 
+CampaignInfo at_speed(CampaignInfo campaign, std::optional<double> measured_rpm) {
+  if (measured_rpm.value_or(0) > 0) campaign.rig.nominal_speed_rpm = *measured_rpm;
+  return campaign;
+}
+
 std::string outside_range(std::string_view column, double value) {
   const KnownColumn* known = known_column(column);
   if (known == nullptr || (value >= known->lowest && value <= known->highest)) return "";

@@ -39,6 +39,14 @@ std::vector<Untestable> untestable_effects(const Observations& observations,
   return result;
 }
 
+/// Whether the zeros of runs are by tares that have its conditions.
+bool has_tares(const Observations& observations, const Effect& effect) {
+  return std::ranges::all_of(effect.covariates, [&](const std::string& name) {
+    const Covariate* covariate = observations.find(name);
+    return covariate != nullptr && covariate->at_zero.size() > 0;
+  });
+}
+
 constexpr std::string_view kNoValue = "it has no value in ";
 
 std::string no_value_in_words(const Effect& effect, const Observations& observations, Index row) {
@@ -159,7 +167,8 @@ Testability CanBeFound::operator()(const Effect& effect) const {
   else if (const auto row = has_evidence_.undefined(ways[0]))
     can.reason = no_value_in_words(effect, observations_, *row);
   else if (std::none_of(ways.begin(), ways.end(), std::cref(has_evidence_)))
-    can.reason = observations_.from_table
+    can.reason = effect.of_zero && has_tares(observations_, effect) ? "the tares take it off"
+                 : observations_.from_table
                      ? "it does not vary within any group beside the baseline, which absorbs it"
                      : "it does not vary within any location, so the location's coefficient absorbs it";
   return can;

@@ -24,8 +24,14 @@ void warn_of_doubts(Explanation& explanation) {
             "{}: its {} is theory's {:.4g}, and the data alone say {:.4g} to {:.4g}: something else goes "
             "with it",
             adopted.term.label(), parameter.name, parameter.value, parameter.low, parameter.high));
-    if (const ParameterEstimate& amplitude = adopted.parameters[0];
-        amplitude.theory && amplitude.low <= 0 && amplitude.high >= 0)
+    const ParameterEstimate& amplitude = adopted.parameters[0];
+    const std::optional<double> theory = adopted.term.effect->theory();
+    if (theory && !amplitude.theory && !adopted.term.per_group &&
+        (*theory < amplitude.low || *theory > amplitude.high))
+      explanation.warnings.push_back(
+          fmt::format("{}: its {} is {:.4g} to {:.4g}, and theory says {:.4g}: something else goes with it",
+                      adopted.term.label(), amplitude.name, amplitude.low, amplitude.high, *theory));
+    if (amplitude.theory && amplitude.low <= 0 && amplitude.high >= 0)
       explanation.warnings.push_back(
           fmt::format("{}: the data alone do not tell its {} from 0", adopted.term.label(), amplitude.name));
   }
