@@ -33,8 +33,9 @@ std::vector<std::byte> volts(std::size_t frames,
   return bytes;
 }
 
-RunStatistics summarize(const std::vector<std::byte>& data, const RawFormat& format, std::size_t piece = 0) {
-  const auto summarizer = make_run_summarizer(kCampaign, format);
+RunStatistics summarize(const std::vector<std::byte>& data, const RawFormat& format, std::size_t piece = 0,
+                        std::optional<double> measured_rpm = {}) {
+  const auto summarizer = make_run_summarizer(at_speed(kCampaign, measured_rpm), format);
   const std::size_t step = piece == 0 ? data.size() : piece * format.frame_size();
   for (std::size_t at = 0; at < data.size(); at += step) {
     summarizer->frames(std::span(data).subspan(at, std::min(step, data.size() - at)));
@@ -182,6 +183,28 @@ TEST(RunSummary, LinesAreFoundNamedAndMeasured) {
   EXPECT_NEAR(lines["mains_50"].amplitude_V, 0.01, 0.001);
   ASSERT_TRUE(lines.contains("shaft_x9_alias")) << "753 Hz folds to 580 Hz";
   EXPECT_NEAR(lines["shaft_x9_alias"].frequency_hz, kRate_hz - 9 * shaft_hz, 0.05);
+}
+
+/// Of a run of a second: the thirteenth multiple of 201.3 Hz would appear at 50 Hz, but the mains are there.
+TEST(RunSummary, AHumIsNoAliasOfAFastShaft) {
+  std::mt19937_64 engine(10);
+  std::normal_distribution<double> unit;
+  constexpr double kShaft_hz = 201.28;
+  const auto wave = [](double frequency, std::size_t i) {
+    return std::sin(2 * std::numbers::pi * frequency * static_cast<double>(i) / kRate_hz);
+  };
+  const RunStatistics statistics =
+      summarize(volts(1600,
+                      [&](std::size_t i, std::size_t) {
+                        return 2 + 0.01 * unit(engine) + 0.05 * wave(kShaft_hz, i) + 0.03 * wave(49.98, i);
+                      }),
+                {SampleType::kFloat64, 4}, 0, 60 * kShaft_hz);
+  const ChannelStatistics& channel = statistics.channels[0];
+  ASSERT_TRUE(channel.shaft_hz.has_value()) << "far from the nominal speed, but where it was measured";
+  EXPECT_NEAR(*channel.shaft_hz, kShaft_hz, 0.2);
+  ASSERT_GE(channel.lines.size(), 2u);
+  EXPECT_EQ(channel.lines[0].name, "shaft");
+  EXPECT_EQ(channel.lines[1].name, "mains_50");
 }
 
 TEST(RunSummary, NoiseHasNoLines) {
