@@ -68,8 +68,7 @@ void remove_if_without_runs(const std::string& db) {
     const CampaignFile file(db, CampaignFile::Access::kRead);
     if (!raw_runs(file).empty()) return;
   }
-  for (const char* suffix : {"", "-wal", "-shm", "-journal", ".lock"})
-    std::filesystem::remove(db + suffix, error);
+  for (const auto& file : files_of_campaign(db)) std::filesystem::remove(file, error);
 }
 
 int run_log(const LogOptions& options) {

@@ -80,9 +80,8 @@ int run_map(const MapOptions& options) {
         return std::isnan(location.c_t.standard_uncertainty);
       }))
     warn(
-        "how far C_T and U scatter is not known (no location was repeated, and there are no raw data): the "
-        "maps' "
-        "uncertainty is without it");
+        "how far C_T and U scatter is not known (no location was repeated, and there are no raw data): "
+        "the maps' uncertainty is without it");
   if (written.warning) warn(*written.warning);
   if (options.json) {
     nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},

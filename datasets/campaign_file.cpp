@@ -117,6 +117,13 @@ std::string unchanging(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::vector<std::filesystem::path> files_of_campaign(const std::filesystem::path& path) {
+  std::vector<std::filesystem::path> files;
+  for (const char* suffix : {"", "-wal", "-shm", "-journal", ".lock"})
+    files.push_back(with_suffix(path, suffix));
+  return files;
+}
+
 void migrate(Database& database, std::string_view schema) {
   for (const SchemaPart& part : schema_parts(schema)) {
     if (part.version <= database.scalar_integer("PRAGMA user_version")) continue;

@@ -56,8 +56,10 @@ void refuse_campaign_itself(const CampaignFile& file, const std::filesystem::pat
   const auto real = [&](const std::filesystem::path& path) {
     return std::filesystem::weakly_canonical(path, error);
   };
-  for (const char* suffix : {"", "-wal", "-shm", "-journal", ".lock", ".part"}) {
-    if (real(target) == real(file.path().string() + suffix))
+  std::vector<std::filesystem::path> own = files_of_campaign(file.path());
+  own.emplace_back(file.path().string() + ".part");
+  for (const auto& each : own) {
+    if (real(target) == real(each))
       throw InputError::in(target.string(),
                            "is the campaign file itself, or one that belongs to it; export "
                            "to another name");

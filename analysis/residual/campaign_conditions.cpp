@@ -63,7 +63,8 @@ class AtZero {
     if (covariate.name == "hours_in_session")
       return covariate.value(row, 0) + (at.start_s - run(row).start_s) / 3600;
     if (covariate.name == "mains_amplitude_V")
-      return mains_amplitude_V(data_.statistics.at(at.run).channels[static_cast<std::size_t>(channel)]);
+      return amplitude_of_lines_V(data_.statistics.at(at.run).channels[static_cast<std::size_t>(channel)],
+                                  is_mains);
     if (const auto value = condition(at, covariate.name)) return *value;
     lacking_[covariate.name].insert(tare);
     return nearest(covariate, at);
@@ -110,10 +111,10 @@ std::optional<double> condition(const Run& run, const std::string& name) {
   return {};
 }
 
-double mains_amplitude_V(const ChannelStatistics& channel) {
+double amplitude_of_lines_V(const ChannelStatistics& channel, bool (*chosen)(std::string_view name)) {
   double amplitude_V = 0;
-  for (const auto& line : channel.lines)
-    if (line.name.starts_with("mains")) amplitude_V += line.amplitude_V;
+  for (const SpectralLine& line : channel.lines)
+    if (chosen(line.name)) amplitude_V += line.amplitude_V;
   return amplitude_V;
 }
 

@@ -133,19 +133,15 @@ void add_raw_covariates(const Source& source, Observations& result) {
       result.not_usable[name] = fmt::format("missing in {} of {} runs", missing, source.rows());
     result.covariates.push_back(std::move(covariate));
   };
-  const auto lines = [](const auto& chosen) {
+  const auto lines = [](bool (*chosen)(std::string_view)) {
     return [chosen](const RunStatistics&, const ChannelStatistics& channel) {
-      double amplitude = 0;
-      for (const SpectralLine& line : channel.lines)
-        if (chosen(line.name)) amplitude += line.amplitude_V;
-      return amplitude;
+      return amplitude_of_lines_V(channel, chosen);
     };
   };
   add("clip_fraction", [](const RunStatistics& run, const ChannelStatistics& channel) {
     return static_cast<double>(channel.clipped) / static_cast<double>(run.frames);
   });
-  add("mains_amplitude_V",
-      [](const RunStatistics&, const ChannelStatistics& channel) { return mains_amplitude_V(channel); });
+  add("mains_amplitude_V", lines(is_mains));
   add("alias_amplitude_V", lines([](std::string_view name) { return name.find("alias") != name.npos; }));
   add("vibration_amplitude_V",
       lines([](std::string_view name) { return name == "shaft" || name == "blade_pass"; }));
@@ -193,10 +189,9 @@ void add_derived_covariates(const Source& source, Observations& result) {
 
 /// Open space has one coefficient for all heights where the baseline says so.
 std::string group_of(const Run& run, const std::string& baseline) {
-  const bool open =
-      !run.in_tunnel() &&
-      (run.location == "OS" || run.location.starts_with("GND") || run.location.starts_with("CEIL") ||
-       run.number(std::string(kGroundDistance)) || run.number(std::string(kCeilingDistance)));
+  const bool open = !run.in_tunnel() && (run.location == "OS" || run.location.starts_with("GND") ||
+                                         run.location.starts_with("CEIL") || run.number(kGroundDistance) ||
+                                         run.number(kCeilingDistance));
   return baseline == "open_space" && open ? kOpenSpace : run.location;
 }
 

@@ -77,8 +77,8 @@ bool Search::within_bounds(const Scan& scan, std::size_t i) {
 
 std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
   std::vector<Ranked> result;
-  Index place =
-      observations_.slopes.cols();  // of its column: effects of groups are the last slopes, in order
+  // The effect's column: those of groups are the last slopes, in the order of their terms.
+  Index place = observations_.slopes.cols();
   std::size_t t = fit_.model.terms.size();
   do {
     if (fit_.model.terms[--t].per_group) --place;

@@ -33,6 +33,10 @@ std::vector<std::byte> volts(std::size_t frames,
   return bytes;
 }
 
+double wave(double frequency_hz, std::size_t frame) {
+  return std::sin(2 * std::numbers::pi * frequency_hz * static_cast<double>(frame) / kRate_hz);
+}
+
 RunStatistics summarize(const std::vector<std::byte>& data, const RawFormat& format, std::size_t piece = 0,
                         std::optional<double> measured_rpm = {}) {
   const auto summarizer = make_run_summarizer(at_speed(kCampaign, measured_rpm), format);
@@ -163,9 +167,6 @@ TEST(RunSummary, LinesAreFoundNamedAndMeasured) {
   std::mt19937_64 engine(9);
   std::normal_distribution<double> unit;
   const double shaft_hz = 83.71;
-  const auto wave = [](double frequency, std::size_t i) {
-    return std::sin(2 * std::numbers::pi * frequency * static_cast<double>(i) / kRate_hz);
-  };
   const RunStatistics statistics = summarize(
       volts(80000,
             [&](std::size_t i, std::size_t) {
@@ -190,9 +191,6 @@ TEST(RunSummary, AHumIsNoAliasOfAFastShaft) {
   std::mt19937_64 engine(10);
   std::normal_distribution<double> unit;
   constexpr double kShaft_hz = 201.28;
-  const auto wave = [](double frequency, std::size_t i) {
-    return std::sin(2 * std::numbers::pi * frequency * static_cast<double>(i) / kRate_hz);
-  };
   const RunStatistics statistics =
       summarize(volts(1600,
                       [&](std::size_t i, std::size_t) {

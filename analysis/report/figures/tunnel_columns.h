@@ -8,9 +8,8 @@
 
 namespace tunnelrig::report {
 
-constexpr double kPlotLeft_mm = 17.5, kPlotRight_mm = 2,
-                 kLeftTitle_mm = 14.8,  // of a plot with five digits at its axis
-    kLegendLeft_mm = 8;
+constexpr double kPlotLeft_mm = 17.5, kPlotRight_mm = 2, kLegendLeft_mm = 8;
+constexpr double kLeftTitle_mm = 14.8;  // of a plot with five digits at its axis
 constexpr const char* kHeightTitle = "← ground    z̄ = 2z/(h_t − h_q) [–]    ceiling →";
 
 /// Locations of one distance from the middle plane, from the ground upwards.
