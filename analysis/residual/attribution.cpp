@@ -22,7 +22,7 @@ Attribution Search::run() {
   CurveScan curves = scan_curves();
   // Once more where rotors differ: what was found while they were taken to be alike may have been scatter.
   for (int again = 0;
-       again < 2 && (again == 0 || observations_.scatter.rotors.size() > 0) && begin_with_scatter_of(curves);
+       again < 2 && (again == 0 || observations_.scatter.rotors_differ()) && begin_with_scatter_of(curves);
        ++again) {
     add_effects();
     curves = scan_curves();
@@ -91,10 +91,16 @@ std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Obse
 }
 
 double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha) {
-  const double variance = std::pow(variances.sigma[0], 2) * (1 + kRatios[variances.ratio[0]]);
-  const double values = static_cast<double>(std::max<Eigen::Index>(mixed.dof(0), 1)) *
-                        std::pow(mixed.mode_matrix().col(0).sum(), 2);
-  return deviates(-std::log10(alpha)) * std::sqrt(variance / values);
+  const Eigen::RowVectorXd of_all = mixed.mode_matrix().colwise().sum();
+  double information = 0;
+  for (std::size_t s = 0; s < mixed.strata().size(); ++s) {
+    const MixedModel::Stratum& stratum = mixed.strata()[s];
+    if (!stratum.means()) continue;
+    const double runs = static_cast<double>(std::max<Eigen::Index>(mixed.dof(s) / stratum.modes, 1));
+    information += runs * of_all.segment(stratum.first_mode, stratum.modes).squaredNorm() /
+                   (std::pow(variances.sigma[s], 2) * (1 + kRatios[variances.ratio[s]]));
+  }
+  return deviates(-std::log10(alpha)) / std::sqrt(information);
 }
 
 double deviates(double evidence) {

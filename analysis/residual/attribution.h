@@ -58,7 +58,8 @@ struct FoundCurve {
 struct Attribution {
   std::vector<Accepted> accepted;
   std::vector<FoundCurve> curves;
-  bool session_unknown = false;
+  /// Sessions scatter far more than runs: of which rotor, −1 for what several do.
+  std::optional<int> session_unknown = {};
   JointFit baseline, final;   // without and with the accepted terms and curves
   Observations observations;  // what `final` speaks of: with a group's own amplitudes among its baseline
   std::vector<Round> rounds, curve_rounds;

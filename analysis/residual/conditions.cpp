@@ -227,6 +227,14 @@ void warn_of_scatter(const Observations& observations, Explanation& explanation)
     explanation.warnings.push_back(
         fmt::format("rotors scatter unlike each other (over their geometric mean: {:.2f}): allowed for",
                     fmt::join(observations.scatter.rotors, ", ")));
+  if (const auto& rotors = observations.scatter.sessions.rotors; !rotors.empty()) {
+    std::vector<int> from_one;
+    for (const int rotor : rotors) from_one.push_back(rotor + 1);
+    explanation.warnings.push_back(
+        fmt::format("sessions of rotor {} differ by more than the others' (a tare that repeats badly, a cell "
+                    "mounted anew): allowed for",
+                    fmt::join(from_one, " and rotor ")));
+  }
   if (observations.scatter.runs.size() > 0)
     explanation.warnings.push_back(fmt::format("{}: allowed for", wilder_runs(observations)));
   if (const auto& [names, runs] = observations.scatter.by_condition; !names.empty())

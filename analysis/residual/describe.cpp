@@ -21,6 +21,35 @@ struct Drawn {
   VectorXd columns;
 };
 
+/// Of what a curve is over.
+struct Stretch {
+  double low, high;
+};
+
+/// Where the groups' ranges overlap. From one stretch to the next the groups' constants may have any
+/// difference: the curve is not known there.
+std::vector<Stretch> stretches_of(const Observations& observations, const std::vector<int>& rows,
+                                  const Curve& curve) {
+  const Stretch all{curve.x.minCoeff(), curve.x.maxCoeff()};
+  if (curve.strength || !curve.everywhere()) return {all};
+  std::vector<Stretch> of_groups;
+  for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
+    const MatrixXd x = curve.x(own, Eigen::all);
+    of_groups.push_back({x.minCoeff(), x.maxCoeff()});
+  }
+  std::sort(of_groups.begin(), of_groups.end(),
+            [](const Stretch& a, const Stretch& b) { return a.low < b.low; });
+  std::vector<Stretch> merged;
+  for (const Stretch& each : of_groups) {
+    if (merged.empty() || each.low > merged.back().high)
+      merged.push_back(each);
+    else
+      merged.back().high = std::max(merged.back().high, each.high);
+  }
+  std::erase_if(merged, [](const Stretch& each) { return each.low == each.high; });
+  return merged.empty() ? std::vector{all} : merged;
+}
+
 /// A curve is known but for a constant: it is drawn about its mean, and its band is of that.
 void centre(std::vector<Drawn>& points) {
   VectorXd mean = VectorXd::Zero(points[0].columns.size());
@@ -137,39 +166,47 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   const double scale = observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
   const bool within = found.curve.x.size() == 0;
   const double duration_s = observations.duration_s.maxCoeff();
-  std::vector<Drawn> points =
-      result.levels ? drawn_levels(curve)
-      : within      ? drawn_curve(curve, 0, duration_s, 0, duration_s)
-                    : drawn_curve(curve, curve.x.minCoeff(), curve.x.maxCoeff(), curve.low, curve.high);
-  if (!result.levels) take_out_baseline(observations, rows, curve, points);
-  if (!curve.strength) centre(points);
-  double lowest = 1e300, highest = -1e300;
-  for (const Drawn& point : points) {
-    const double value = scale * point.columns.dot(amplitude),
-                 half =
-                     1.96 * scale * std::sqrt(std::max(0.0, point.columns.dot(covariance * point.columns)));
-    result.shape.push_back({point.x, value, value - half, value + half});
-    lowest = std::min(lowest, value);
-    highest = std::max(highest, value);
+  std::vector<std::vector<Drawn>> pieces;
+  if (result.levels)
+    pieces.push_back(drawn_levels(curve));
+  else if (within)
+    pieces.push_back(drawn_curve(curve, 0, duration_s, 0, duration_s));
+  else
+    for (const Stretch& stretch : stretches_of(observations, rows, curve))
+      pieces.push_back(drawn_curve(curve, stretch.low, stretch.high, curve.low, curve.high));
+  for (std::vector<Drawn>& points : pieces) {
+    if (!result.levels) take_out_baseline(observations, rows, curve, points);
+    if (!curve.strength) centre(points);
+    double lowest = 1e300, highest = -1e300;
+    for (const Drawn& point : points) {
+      const double value = scale * point.columns.dot(amplitude);
+      const double half =
+          1.96 * scale * std::sqrt(std::max(0.0, point.columns.dot(covariance * point.columns)));
+      result.shape.push_back({point.x, value, value - half, value + half});
+      lowest = std::min(lowest, value);
+      highest = std::max(highest, value);
+    }
+    result.amplitude = std::max(result.amplitude, (highest - lowest) / 2);
   }
-  result.amplitude = (highest - lowest) / 2;
   return result;
 }
 
-UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual,
+UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual, int rotor,
                                    const std::vector<int>& rows) {
   UnknownStructure result{.covariate = "session",
                           .condition = "session",
                           .covariate_unit = {},
                           .place = {},
                           .times = {},
+                          .rotor = rotor,
                           .p_value = 0.025,
                           .shape = {},
                           .labels = {},
                           .instead_of = {}};
   std::map<int, std::vector<double>> offsets;
   for (std::size_t r = 0; r < rows.size(); ++r) {
-    const double mean = -residual.row(static_cast<Index>(r)).mean();
+    const auto run = residual.row(static_cast<Index>(r));
+    const double mean = rotor < 0 ? -run.mean() : -run(rotor);
     if (!std::isnan(mean)) offsets[observations.block[static_cast<std::size_t>(rows[r])]].push_back(mean);
   }
   const auto mean_of = [](const std::vector<double>& values) {

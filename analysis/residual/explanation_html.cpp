@@ -184,18 +184,13 @@ class Page {
   /// group's.
   MatrixXd added_by(std::size_t t) const {
     const AdoptedEffect& adopted = explanation_.adopted[t];
-    const TermResponse response = respond(adopted.term, observations_, forces_.acted_on[t]);
-    if (!adopted.term.per_group) return response.value[0];
-    MatrixXd added = response.derivative[0][0];
-    for (const int row : rows_) {
-      const auto group = static_cast<std::size_t>(observations_.group[static_cast<std::size_t>(row)]);
-      const auto& estimates = adopted.parameters[0].groups;
-      const auto own = std::find_if(estimates.begin(), estimates.end(), [&](const GroupEstimate& estimate) {
-        return estimate.group == observations_.group_name[group];
-      });
-      added.row(row) *= own == estimates.end() ? 0 : own->value;
-    }
-    return added;
+    if (!adopted.term.per_group) return respond(adopted.term, observations_, forces_.acted_on[t]).value[0];
+    VectorXd amplitude = VectorXd::Zero(observations_.groups());
+    for (const GroupEstimate& estimate : adopted.parameters[0].groups)
+      for (int group = 0; group < observations_.groups(); ++group)
+        if (observations_.group_name[static_cast<std::size_t>(group)] == estimate.group)
+          amplitude(group) = estimate.value;
+    return respond_in_groups(adopted.term, amplitude, observations_, forces_.acted_on[t]).value;
   }
 
   void add_effect(std::size_t t, Json& list) const {

@@ -94,9 +94,10 @@ ParameterEstimate summary_of_groups(const EffectParameter& parameter, std::vecto
 UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
                           const std::vector<int>& rows);
 
-/// Session scatter that no covariate explains: the sessions' offsets themselves are the shape.
+/// Session scatter that no covariate explains: the sessions' offsets themselves are the shape. Of a rotor;
+/// −1: of the rotors' mean.
 UnknownStructure describe_sessions(const Observations& observations, const Eigen::MatrixXd& residual,
-                                   const std::vector<int>& rows);
+                                   int rotor, const std::vector<int>& rows);
 
 // --- suspects.cpp
 

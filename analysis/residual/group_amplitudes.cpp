@@ -15,17 +15,72 @@ namespace {
 
 constexpr double kLeastSeen = 1e-6;  // of a column: below it what is left is rounding
 
+/// Amplitudes of a term by group, within its bounds; 0 where the group does not say.
+VectorXd amplitudes_of(const Observations& observations, const JointFit& fit, std::size_t t,
+                       const std::vector<int>& rows) {
+  const EffectParameter& amplitude = fit.model.terms[t].effect->parameters[0];
+  VectorXd result = VectorXd::Zero(observations.groups());
+  for (const GroupEstimate& estimate : estimate_by_group(observations, fit.model, t, fit.variances, rows))
+    for (int group = 0; group < observations.groups(); ++group)
+      if (observations.group_name[static_cast<std::size_t>(group)] == estimate.group)
+        result(group) = std::clamp(estimate.value, amplitude.lower, amplitude.upper);
+  return result;
+}
+
 }  // namespace
+
+OwnResponse respond_in_groups(Term term, const VectorXd& amplitude, const Observations& observations,
+                              const MatrixXd& forces) {
+  OwnResponse result{VectorXd::Zero(observations.rows()), VectorXd::Zero(observations.rows())};
+  for (const auto& [group, own] : places_of_each(observations.group)) {
+    term.parameters[0] = amplitude(group);
+    const TermResponse response = respond(term, observations, forces);
+    result.value(own) = response.value[0](own, 0);
+    result.derivative(own) = response.derivative[0][0](own, 0);
+  }
+  return result;
+}
+
+Index place_among_own(const MeanModel& model, std::size_t t) {
+  return std::count_if(model.terms.begin(), model.terms.begin() + static_cast<std::ptrdiff_t>(t),
+                       [](const Term& term) { return term.per_group; });
+}
+
+JointFit fit_in_turns(Observations& observations, const MeanModel& model, const std::vector<int>& rows) {
+  constexpr int kMostTurns = 10;
+  constexpr double kSettled = 1e-4;  // of what the effect does
+  JointFit fit = fit_jointly(observations, model, rows);
+  const Index first = observations.slopes.cols() - observations.beyond.cols();
+  bool settled = observations.beyond.cols() == 0;
+  for (int turn = 0; turn < kMostTurns && !settled; ++turn) {
+    const VectorXd predicted = predict_response(observations, fit.model, rows).col(0);
+    MatrixXd slopes = observations.slopes, beyond = observations.beyond;
+    settled = true;
+    for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
+      if (!fit.model.terms[t].per_group) continue;
+      const Index k = place_among_own(fit.model, t);
+      const VectorXd by_group = amplitudes_of(observations, fit, t, rows);
+      const VectorXd amplitude = by_group(observations.group);
+      const VectorXd made = amplitude.cwiseProduct(slopes.col(first + k)) + beyond.col(k);
+      const VectorXd acted_on = observations.multiplicative ? VectorXd(predicted.array() / made.array().exp())
+                                                            : VectorXd(predicted - made);
+      const OwnResponse own = respond_in_groups(fit.model.terms[t], by_group, observations, acted_on);
+      slopes.col(first + k) = own.derivative;
+      beyond.col(k) = own.value - amplitude.cwiseProduct(own.derivative);
+      settled &= (own.value - made).norm() <= kSettled * own.value.norm();
+    }
+    if (!slopes.allFinite() || !beyond.allFinite()) break;  // a force that has changed its sign
+    observations.slopes = std::move(slopes);
+    observations.beyond = std::move(beyond);
+    fit = fit_jointly(observations, fit.model, rows);
+  }
+  return fit;
+}
 
 std::vector<GroupEstimate> estimate_by_group(const Observations& observations, const MeanModel& model,
                                              std::size_t t, const NullFit& variances,
                                              const std::vector<int>& rows) {
-  const auto own_amplitudes = [&](std::size_t end) {
-    return std::count_if(model.terms.begin(), model.terms.begin() + static_cast<std::ptrdiff_t>(end),
-                         [](const Term& term) { return term.per_group; });
-  };
-  // Effects of each group's own are the last of the baseline's slopes, in their order.
-  const Index column = observations.slopes.cols() - own_amplitudes(model.terms.size()) + own_amplitudes(t);
+  const Index column = observations.slopes.cols() - observations.beyond.cols() + place_among_own(model, t);
   const Components offset = linearise(observations, model, predict_forces(observations, model, rows)).offset;
   std::vector<GroupEstimate> result;
   for (const auto& [group, own] : rows_of_each(observations.group, rows)) {

@@ -1,4 +1,4 @@
-// An effect's amplitude where each group has its own.
+// An effect whose amplitude is each group's own.
 #pragma once
 
 #include "analysis/residual/joint_fit.h"
@@ -19,5 +19,19 @@ struct GroupEstimate {
 std::vector<GroupEstimate> estimate_by_group(const Observations& observations, const MeanModel& model,
                                              std::size_t t, const NullFit& variances,
                                              const std::vector<int>& rows);
+
+/// n: what a term does on these forces, with an amplitude for each group, and its derivative by that.
+struct OwnResponse {
+  Eigen::VectorXd value, derivative;
+};
+OwnResponse respond_in_groups(Term term, const Eigen::VectorXd& amplitude, const Observations& observations,
+                              const Eigen::MatrixXd& forces);
+
+/// Of the columns of effects with amplitudes of the groups' own, which one is term t's: from 0.
+Eigen::Index place_among_own(const MeanModel& model, std::size_t t);
+
+/// A joint fit where such effects do what their formulas say at the amplitudes that are found, on forces that
+/// they have not changed themselves: slopes and `beyond` of the observations are set to it.
+JointFit fit_in_turns(Observations& observations, const MeanModel& model, const std::vector<int>& rows);
 
 }  // namespace tunnelrig

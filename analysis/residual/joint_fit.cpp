@@ -248,6 +248,10 @@ Forces predict_forces(const Observations& observations, const MeanModel& model,
   double change = 0;
   for (int turn = 0; turn < kMostTurns && !model.terms.empty(); ++turn) {
     MatrixXd residual = observations.y, added = none;
+    if (observations.beyond.size() > 0) {
+      added = observations.beyond.rowwise().sum();
+      residual -= added;
+    }
     std::vector<MatrixXd> own(model.terms.size(), none);
     for (std::size_t t = 0; t < model.terms.size(); ++t) {
       const MatrixXd value = respond(model.terms[t], observations, forces.acted_on[t]).value[0];
@@ -277,9 +281,10 @@ LinearModel linearise(const Observations& observations, const MeanModel& model, 
   LinearModel linear{
       Components(1 + observations.shape.size(), MatrixXd::Zero(observations.rows(), observations.channels())),
       {}};
+  if (observations.beyond.size() > 0) linear.offset[0] += observations.beyond.rowwise().sum();
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const Term& term = model.terms[t];
-    if (term.per_group) continue;  // a part of the baseline (Observations::slopes)
+    if (term.per_group) continue;  // a part of the baseline (Observations::slopes, beyond)
     TermResponse response = respond(term, observations, forces.acted_on[t]);
     for (std::size_t k = 0; k < linear.offset.size(); ++k) linear.offset[k] += response.value[k];
     for (std::size_t k = 0; k < response.derivative.size(); ++k)

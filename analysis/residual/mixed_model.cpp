@@ -20,7 +20,7 @@ MatrixXd orthonormal_from(const VectorXd& first) {
 
 /// Rotors that have something in common and each as much of its own: D^(−½) makes what they have of their own
 /// alike, and what they have in common a direction, which is the first mode.
-MatrixXd modes_of(const VectorXd& rotor_scatter) {
+MatrixXd modes_of_unlike(const VectorXd& rotor_scatter) {
   const VectorXd one = rotor_scatter.cwiseInverse();
   return one.asDiagonal() * orthonormal_from(one);
 }
@@ -33,6 +33,11 @@ MatrixXd orthonormal_modes(Index channels) {
     return modes / 2;
   }
   return orthonormal_from(VectorXd::Ones(channels));
+}
+
+MatrixXd modes_of(const RunScatter& scatter, Index channels) {
+  if (scatter.sessions.modes.size() > 0) return scatter.sessions.modes;
+  return scatter.rotors.size() > 0 ? modes_of_unlike(scatter.rotors) : orthonormal_modes(channels);
 }
 
 /// (DΦD + a 11ᵀ)^(−½) = (I − share w wᵀ) A D⁻¹, block by block: D⁻¹ divides each run by its scatter, A =
@@ -116,24 +121,26 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
     : MixedModel(observations, std::move(rows), ratio, observations.scatter) {}
 
 MixedModel MixedModel::baseline_alone(const Observations& observations, std::vector<int> rows) {
-  return {observations, std::move(rows), {0}, {.rotors = observations.scatter.rotors}};
+  return {observations,
+          std::move(rows),
+          {0},
+          {.rotors = observations.scatter.rotors, .sessions = observations.scatter.sessions}};
 }
 
 MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
                        const std::vector<std::size_t>& ratio, const RunScatter& scatter)
     : observations_(observations),
       rows_(std::move(rows)),
-      modes_(scatter.rotors.size() > 0 ? modes_of(scatter.rotors)
-                                       : orthonormal_modes(observations.channels())),
+      modes_(modes_of(scatter, observations.channels())),
       run_correlation_(scatter.run_correlation),
       alike_(VectorXd::Ones(static_cast<Index>(rows_.size()))),
       scatter_(scatter.of_runs(rows_)) {
   if (modes_(0, 0) < 0) modes_ *= -1;
-  rotors_of_modes_ = scatter.rotors.size() > 0 ? MatrixXd(modes_.inverse()) : modes_.transpose();
+  rotors_of_modes_ = scatter.rotors_differ() ? MatrixXd(modes_.inverse()) : modes_.transpose();
+  const int channels = static_cast<int>(observations.channels()), alone = scatter.sessions.alone;
   for (std::size_t component = 0; component <= observations.shape.size(); ++component) {
-    strata_.push_back({component, 0, 1});
-    if (observations.channels() > 1)
-      strata_.push_back({component, 1, static_cast<int>(observations.channels()) - 1});
+    for (int mode = 0; mode < alone; ++mode) strata_.push_back({component, mode, 1});
+    if (channels > alone) strata_.push_back({component, alone, channels - alone});
   }
   if (observations.blocks_are_rows) ratios_ = 1;
   blocks_ = without_numbers(places_of_each(observations.block, rows_));

@@ -3,8 +3,9 @@
 //   y = (group's constant, free per rotor) + terms + session + run
 //
 // The rotors' y are rotated into one common and c − 1 difference modes (each rotor's first divided by its
-// scatter, where they differ in it); the runs' means and each cosine coefficient of their course, common or
-// difference, make a stratum with a run variance σ² and a session variance a σ² of its own. A run's mean may
+// scatter, where they differ in it; of rotors whose sessions differ more, each has a mode of its own); the
+// runs' means and each cosine coefficient of their course, common or difference, make a stratum with a run
+// variance σ² and a session variance a σ² of its own. A run's mean may
 // be correlated with that of the run before it by φ, and scatter d times as much as most: V = σ² (DΦD + a
 // 11ᵀ) in each session, Φ_ij = φ^|i − j|, D = diag(d). docs/closed-loop.md has the equations.
 #pragma once
@@ -41,7 +42,8 @@ class MixedModel {
     std::size_t component = 0;  // 0: the runs' means; j: their course's j-th cosine
     int first_mode = 0, modes = 1;
     bool means() const { return component == 0; }
-    std::size_t side() const { return first_mode == 0 ? 0 : 1; }  // common, differences
+    /// Common (or the most of it, where a rotor's sessions differ more), differences.
+    std::size_t side() const { return first_mode == 0 ? 0 : 1; }
   };
 
   /// `ratio`: only these ratios are prepared (of each stratum); empty: all.
@@ -104,7 +106,7 @@ class MixedModel {
                         std::mt19937_64& random) const;
 
   /// By which rows of rotors are multiplied, c × c: orthonormal where rotors scatter alike. What is the same
-  /// in all rotors is in the first mode alone.
+  /// in all rotors is in the first mode alone, but for modes of rotors whose sessions differ more.
   const Eigen::MatrixXd& mode_matrix() const { return modes_; }
   /// Its inverse: by which rows of modes are multiplied.
   const Eigen::MatrixXd& rotors_of_modes() const { return rotors_of_modes_; }

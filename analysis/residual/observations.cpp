@@ -102,6 +102,7 @@ Observations Observations::subset(const std::vector<int>& kept) const {
   for (Eigen::MatrixXd* matrix : {&part.value, &part.known, &part.y, &part.slopes})
     *matrix = Eigen::MatrixXd((*matrix)(kept, Eigen::all));
   for (Eigen::MatrixXd& course : part.shape) course = Eigen::MatrixXd(course(kept, Eigen::all));
+  if (beyond.size() > 0) part.beyond = Eigen::MatrixXd(beyond(kept, Eigen::all));
   if (sign.size() > 0) part.sign = Eigen::VectorXd(sign(kept));
   part.scatter = scatter.subset(kept);
   for (Place& place : part.places) place.weight = Eigen::VectorXd(place.weight(kept));

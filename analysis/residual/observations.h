@@ -76,12 +76,20 @@ struct Place {
   Eigen::VectorXd weight = {};  // n, −1 to 1; 0 in open space
 };
 
+/// Where sessions differ more in some rotors than in others (rotor_sessions.h).
+struct RotorSessions {
+  Eigen::MatrixXd modes = {};  // c × c: by which rows of rotors are multiplied; empty: they differ alike
+  int alone = 1;               // so many modes, from the first, have variances of their own each
+  std::vector<int> rotors = {};
+};
+
 /// What the runs' scatter is like. Not known before the search has found it.
 struct RunScatter {
   /// Of neighbouring runs of a block: what rotors have in common, what they differ by (run_correlation.h).
   std::array<double, 2> run_correlation = {0, 0};
   /// Each rotor's own over their geometric mean; empty: alike (rotor_scatter.h).
   Eigen::VectorXd rotors = {};
+  RotorSessions sessions = {};
   /// n: each run's over that of most, by location and session; empty: alike (run_scatter.h).
   Eigen::VectorXd runs = {};
   /// n: each run's over the rms of all, by these conditions; empty: alike (condition_scatter.h).
@@ -90,6 +98,7 @@ struct RunScatter {
     Eigen::VectorXd runs = {};
   } by_condition = {};
 
+  bool rotors_differ() const { return rotors.size() > 0 || !sessions.rotors.empty(); }
   /// Of some runs, by all of these; 1 where all are alike.
   Eigen::VectorXd of_runs(const std::vector<int>& rows) const;
   RunScatter subset(const std::vector<int>& kept) const;
@@ -116,6 +125,8 @@ struct Observations {
   std::vector<std::string> group_name, block_name;
   Eigen::MatrixXd
       slopes;  // n × s: baseline columns beside the constants, with coefficients of each group's own
+  Eigen::MatrixXd beyond = {};  // n × e: what effects with an amplitude of each group's own, whose columns
+                                // are the last e of `slopes`, do beside amplitude · column; empty: none
   std::vector<bool> in_tunnel;
   std::vector<int> previous;   // the run before in the same session, −1 for the first
   Eigen::VectorXd position;    // n: what change-points are held against; empty: the row's place, from 0

@@ -309,7 +309,8 @@ void estimate_on_all(const Models& models, const Observations& observations, Exp
   for (const FoundCurve& curve : found.curves)
     explanation.unknown.push_back(describe(wide, whole, curve, rows));
   if (found.session_unknown && found.curves.empty())
-    explanation.unknown.push_back(describe_sessions(observations, fitted.error, rows));
+    explanation.unknown.push_back(
+        describe_sessions(observations, fitted.error, *found.session_unknown, rows));
   explanation.suspect_rows =
       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
   warn_of_alike_rows(observations, explanation);

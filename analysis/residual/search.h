@@ -184,7 +184,8 @@ class Search {
   bool is_work_of_a_curve(const Term& term) const;
   /// Effects whose own covariate bends away from their formula give way to a curve.
   void doubt_formulas();
-  bool session_scatter_is_large() const;
+  /// Of which rotor; −1: of what several do; nothing where it is not.
+  std::optional<int> session_scatter_is_large() const;
 
   // what cannot be told apart: search_rivals.cpp
   void find_confounded();

@@ -243,7 +243,9 @@ bool Search::is_taken_back_by_curves(const Term& term, const JointFit& fit) cons
   return cancel(respond(term, observations_, predicted).value[0], made_by_curves(fit, 0));
 }
 
-bool Search::session_scatter_is_large() const {
+std::optional<int> Search::session_scatter_is_large() const {
+  const RotorSessions& unlike = observations_.scatter.sessions;
+  std::optional<int> rotor;
   for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
     if (!mixed_->strata()[s].means()) continue;
     double below = 0;
@@ -251,9 +253,12 @@ bool Search::session_scatter_is_large() const {
       if (kRatios[r] <= settings_.session_ratio * settings_.session_ratio)
         below += fit_.variances.ratio_probability[s][r];
     }
-    if (below < 0.025) return true;
+    if (below >= 0.025) continue;
+    const bool own = unlike.rotors.size() == 1 && mixed_->strata()[s].first_mode < unlike.alone;
+    if (!own) return -1;
+    rotor = unlike.rotors[0];
   }
-  return false;
+  return rotor;
 }
 
 }  // namespace tunnelrig

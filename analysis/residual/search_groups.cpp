@@ -65,8 +65,11 @@ Search::InGroups Search::fit_in_groups(Term term, MeanModel model) const {
   Eigen::MatrixXd& slopes = own.observations.slopes;
   slopes.conservativeResize(Eigen::NoChange, slopes.cols() + 1);
   slopes.rightCols(1) = response.derivative[0][0];
+  Eigen::MatrixXd& beyond = own.observations.beyond;
+  beyond.conservativeResize(slopes.rows(), beyond.cols() + 1);
+  beyond.rightCols(1).setZero();
   model.terms.push_back(std::move(term));
-  own.fit = fit_jointly(own.observations, model, rows_);
+  own.fit = fit_in_turns(own.observations, model, rows_);
   return own;
 }
 

@@ -1,4 +1,5 @@
 // Effects that do as well as an accepted one.
+#include "analysis/residual/group_amplitudes.h"
 #include "analysis/residual/search.h"
 
 #include <algorithm>
@@ -8,6 +9,16 @@
 namespace tunnelrig {
 
 using Eigen::Index;
+
+namespace {
+
+Eigen::MatrixXd without_column(const Eigen::MatrixXd& columns, Index column) {
+  Eigen::MatrixXd result(columns.rows(), columns.cols() - 1);
+  result << columns.leftCols(column), columns.rightCols(columns.cols() - column - 1);
+  return result;
+}
+
+}  // namespace
 
 void Search::find_confounded() {
   for (std::size_t t = 0; t < result_.accepted.size(); ++t) {
@@ -77,16 +88,13 @@ bool Search::within_bounds(const Scan& scan, std::size_t i) {
 
 std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
   std::vector<Ranked> result;
-  // The effect's column: those of groups are the last slopes, in the order of their terms.
-  Index place = observations_.slopes.cols();
-  std::size_t t = fit_.model.terms.size();
-  do {
-    if (fit_.model.terms[--t].per_group) --place;
-  } while (!fit_.model.terms[t].same_way(accepted.term));
+  std::size_t t = 0;
+  while (!fit_.model.terms[t].same_way(accepted.term)) ++t;
+  const Index own_place = place_among_own(fit_.model, t);
+  const Index place = observations_.slopes.cols() - observations_.beyond.cols() + own_place;
   Observations fewer = observations_;
-  for (Index k = place; k + 1 < fewer.slopes.cols(); ++k)
-    fewer.slopes.col(k) = observations_.slopes.col(k + 1);
-  fewer.slopes.conservativeResize(Eigen::NoChange, fewer.slopes.cols() - 1);
+  fewer.slopes = without_column(observations_.slopes, place);
+  fewer.beyond = without_column(observations_.beyond, own_place);
   const JointFit without = fit_without(t, fewer);
   const Eigen::MatrixXd predicted = predict_response(observations_, {}, rows_);
   const Components y = difference(y_, fit_.linear.offset);
@@ -99,12 +107,14 @@ std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
     if (taken) continue;
     Observations other = observations_;
     other.slopes.col(place) = respond(way, observations_, predicted).derivative[0][0];
-    const CrossValidation with_other = cross_validate(other, y, fit_.linear.columns, fit_.variances, rows_);
-    if (compare(with_other, own).told_apart()) continue;
+    other.beyond.col(own_place).setZero();
     MeanModel instead = fit_.model;
     instead.terms[t] = way;
     instead.terms[t].per_group = true;
-    const JointFit fit = fit_jointly(other, instead, rows_);
+    const JointFit fit = fit_in_turns(other, instead, rows_);
+    const CrossValidation with_other =
+        cross_validate(other, difference(y_, fit.linear.offset), fit.linear.columns, fit_.variances, rows_);
+    if (compare(with_other, own).told_apart()) continue;
     const double evidence =
         -std::log10(std::max(p_of_groups(fewer, without, other, fit), 1e-300)) + std::log10(kWeightInGroups);
     if (evidence >= critical_ && fit.at_bound.empty() && groups_within_bounds(other, fit, t))

@@ -2,9 +2,11 @@
 #include "analysis/residual/explanation_output.h"
 #include "analysis/residual/explanation_parts.h"
 #include "analysis/residual/rotor_scatter.h"
+#include "analysis/residual/rotor_sessions.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 namespace tunnelrig {
@@ -105,6 +107,72 @@ TEST_F(Scatter, OfOneRotorDoesNotHideAnEffectOnIt) {
   for (const AdoptedEffect& adopted : e.adopted) rotors.push_back(adopted.term.rotor);
   for (const UnknownStructure& unknown : e.unknown) rotors.push_back(unknown.rotor);
   EXPECT_EQ(rotors, std::vector<int>{2});
+}
+
+/// A tare that repeats badly: an offset for each session, of one rotor alone.
+void let_sessions_differ_more(Observations& o, Index rotor, double sigma, std::mt19937_64& random) {
+  std::normal_distribution<double> normal(0, sigma);
+  VectorXd offset(o.blocks());
+  for (double& each : offset) each = normal(random);
+  MatrixXd y = o.y;
+  y.col(rotor) += offset(o.block);
+  test::set_y(o, y);
+}
+
+/// The modes are those in which runs as well as sessions are uncorrelated.
+TEST_F(Scatter, OfOneRotorsSessionsHasAModeOfItsOwn) {
+  constexpr int kCampaigns = 40;
+  int alike_differ = 0, differ = 0;
+  double correlation = 0;  // of sessions in the two modes
+  for (int i = 0; i < kCampaigns; ++i) {
+    Observations o = observations();
+    const auto rows = o.all_rows();
+    alike_differ += rotor_sessions(o, rows, {o.y}, random).rotors.empty() ? 0 : 1;
+    let_sessions_differ_more(o, 2, 3 * kRunSigma, random);
+    o.scatter.sessions = rotor_sessions(o, rows, {o.y}, random);
+    differ += o.scatter.sessions.rotors == std::vector{2} ? 1 : 0;
+    if (o.scatter.sessions.rotors != std::vector{2}) continue;
+    const MixedModel model(o, rows);
+    ASSERT_EQ(model.strata().size(), 3u);
+    EXPECT_EQ(model.strata()[2].modes, 2);
+    EXPECT_LT(model.mode_matrix().row(2).tail(2).norm(), 1e-9)
+        << "the others' differences have no part of it";
+    const MatrixXd modes = model.mode_matrix();
+    EXPECT_LT((modes * model.rotors_of_modes() - MatrixXd::Identity(4, 4)).cwiseAbs().maxCoeff(), 1e-9);
+    MatrixXd of_sessions = MatrixXd::Identity(4, 4) * 0.4;
+    of_sessions(2, 2) += 9;
+    const MatrixXd c = modes.transpose() * of_sessions * modes;
+    correlation += std::abs(c(0, 1)) / std::sqrt(c(0, 0) * c(1, 1)) / kCampaigns;
+  }
+  EXPECT_LT(correlation, 0.3) << "the rotors' mean and the third against the others: 0.9";
+  EXPECT_LE(alike_differ, 3) << "0.5 % of 40 are expected";
+  EXPECT_GE(differ, kCampaigns - 2);
+}
+
+/// With one variance for all that rotors differ by, half of such campaigns have structure.
+TEST_F(Scatter, OfOneRotorsSessionsIsNoEffect) {
+  constexpr int kCampaigns = 24;
+  int structure = 0, said = 0;
+  for (int i = 0; i < kCampaigns; ++i) {
+    Observations o = observations();
+    test::add_covariate(o, "air_pressure_Pa", 99000, 103000, random);
+    test::add_covariate(o, "relative_humidity", 0.3, 0.7, random);
+    for (std::size_t k = o.covariates.size() - 2; k < o.covariates.size(); ++k) {
+      MatrixXd& of_day = o.covariates[k].value;
+      for (Index row = 1; row < o.rows(); ++row)
+        if (o.block[static_cast<std::size_t>(row)] == o.block[static_cast<std::size_t>(row - 1)])
+          of_day(row) = of_day(row - 1);
+    }
+    let_sessions_differ_more(o, i % 4, 2.5 * kRunSigma, random);
+    const Explanation e = explained(o);
+    for (const std::string& warning : e.warnings)
+      said += warning.starts_with(fmt::format("sessions of rotor {} differ", i % 4 + 1)) ? 1 : 0;
+    structure += e.adopted.empty() && (e.unknown.empty() || e.unknown[0].covariate == "session") ? 0 : 1;
+    for (const UnknownStructure& unknown : e.unknown)
+      structure += unknown.covariate == "session" && unknown.rotor != i % 4 ? 1 : 0;
+  }
+  EXPECT_LE(structure, 4) << "binomial (24, 0.06): beyond 4 in 0.6 % of cases";
+  EXPECT_GE(said, kCampaigns - 3);
 }
 
 TEST_F(Scatter, AGrossRunIsSuspectAndNamesNothing) {

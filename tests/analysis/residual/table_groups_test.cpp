@@ -92,6 +92,53 @@ TEST_F(TablesTest, GroupsWithExponentsOfTheirOwnAreTold) {
   EXPECT_GT(fitted2, 100 * after2);
 }
 
+/// A third of the force is no small effect: its logarithm is not its amplitude.
+TEST_F(TablesTest, LargeAmplitudesOfGroupsAreThoseOfTheFormula) {
+  constexpr std::array<double, 3> kAsymmetry = {-0.3, -0.1, 0.2};
+  std::string csv = "g,i,n,F\n";
+  for (std::size_t g = 0; g < kAsymmetry.size(); ++g)
+    for (int i = 0; i < 80; ++i) {
+      const double speed_rpm = 600 + 40 * (i / 2);
+      const bool reverse = i % 2 == 1;
+      const double force_N = 2.75e-6 * speed_rpm * speed_rpm * (reverse ? -1 - kAsymmetry[g] : 1);
+      csv += fmt::format("{},{},{},{}\n", g, i, speed_rpm, force_N + 0.02 * scatter(random));
+    }
+  const Explanation e =
+      explained(observed(csv,
+                         "groups = [\"g\"]\nblocks = \"bins(i, 20)\"\n"
+                         "[response]\ncolumn = \"F\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+                         "[speed]\ncolumn = \"n\"\nunit = \"rpm\"\n"));
+  ASSERT_EQ(names(e), "bidirectional ");
+  const auto& groups = e.adopted[0].parameters[0].groups;
+  ASSERT_EQ(groups.size(), kAsymmetry.size());
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    EXPECT_NEAR(groups[g].value, kAsymmetry[g], 0.006);
+    EXPECT_NEAR(groups[g].low, kAsymmetry[g], 0.015) << "the interval is no wider than the data";
+    EXPECT_NEAR(groups[g].high, kAsymmetry[g], 0.015);
+  }
+}
+
+/// What the groups' constants absorb is no part of a curve: two packs, each with an arch of its own.
+TEST_F(TablesTest, ACurveIsDrawnWhereGroupsShowItAndNotBetween) {
+  constexpr double kHeight_N = 0.1;
+  std::string csv = "pack,V,y\n";
+  for (int r = 0; r < 160; ++r) {
+    const double u = 2 * even(random) - 1, volts = r % 2 == 0 ? 7.4 + 0.4 * u : 11.6 + 0.4 * u;
+    csv += fmt::format("{},{},{}\n", r % 2, volts,
+                       (r % 2 == 0 ? 4 : 9) + kHeight_N * (1 - u * u) + 0.01 * scatter(random));
+  }
+  const Explanation e = explained(observed(csv,
+                                           "groups = [\"pack\"]\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+                                           "scatter = \"absolute\"\n"
+                                           "[[covariates]]\ncolumn = \"V\"\nunit = \"1\"\n"));
+  ASSERT_EQ(e.unknown.size(), 1u);
+  EXPECT_NEAR(e.unknown[0].amplitude, kHeight_N / 2, 0.4 * kHeight_N / 2);
+  for (const ShapePoint& point : e.unknown[0].shape) {
+    EXPECT_TRUE(point.x < 7.9 || point.x > 11.1) << point.x;
+    EXPECT_LT(std::abs(point.y), kHeight_N);
+  }
+}
+
 /// A moment that is always the force times one arm is in the line of that group, whatever it leaks.
 TEST_F(TablesTest, AGroupWhoseLineAbsorbsTheEffectHasNoAmplitude) {
   constexpr std::array<double, 3> kLeak = {0.2, 0.25, 0.22};

@@ -1,0 +1,179 @@
+#include "analysis/residual/rotor_sessions.h"
+
+#include "analysis/residual/alike.h"
+#include "analysis/residual/session_directions.h"
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <Eigen/Eigenvalues>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
+using Eigen::VectorXd;
+
+/// The rotors' differences, as one stratum of alike sessions has them: which of its directions is likelier
+/// with a session variance of its own.
+class Differences {
+ public:
+  Differences(const MixedModel& model, std::size_t stratum)
+      : model_(model), stratum_(stratum), sessions_(model, stratum) {}
+
+  /// One data set, in a basis (modes × k) of those directions that are still alike.
+  struct Data {
+    MatrixXd left, in_sessions;  // projected at ratio 0: runs × k; session directions × k
+  };
+  Data data(Stacked column, const MatrixXd& basis) const {
+    const Index modes = model_.strata()[stratum_].modes;
+    model_.project(stratum_, 0, column);
+    const Stacked coordinates = sessions_.coordinates(column);
+    return {column.reshaped(column.size() / modes, modes) * basis,
+            coordinates.reshaped(coordinates.size() / modes, modes) * basis};
+  }
+
+  struct Split {
+    double gain = 0;  // of the log-likelihood over alike sessions
+    std::size_t own = 0, others = 0;
+    double variance = 0;  // of runs
+  };
+
+  /// `direction`: in the basis, of length 1. Only a larger variance is asked for.
+  Split split(const Data& data, const VectorXd& direction) const {
+    const VectorXd squares = data.left.colwise().squaredNorm();
+    const MatrixXd covariance = data.left.transpose() * data.left;
+    const double own_squares = direction.dot(covariance * direction);
+    const double dof = static_cast<double>(model_.dof(stratum_)) /
+                       static_cast<double>(model_.strata()[stratum_].modes) *
+                       static_cast<double>(direction.size());
+    const VectorXd own_in_sessions = (data.in_sessions * direction).cwiseAbs2();
+    const VectorXd all_in_sessions = data.in_sessions.rowwise().squaredNorm();
+    const auto rss = [&](double all, const VectorXd& in_sessions, std::size_t ratio) {
+      const VectorXd weights = sessions_.weights(kRatios[ratio]).head(in_sessions.size());
+      return all - weights.dot(in_sessions);
+    };
+    const auto determinant = [&](std::size_t ratio) {
+      return model_.log_determinant(stratum_, ratio) / static_cast<double>(model_.strata()[stratum_].modes);
+    };
+    const auto others = static_cast<double>(direction.size() - 1);
+    double alike = -std::numeric_limits<double>::infinity();
+    Split best{-std::numeric_limits<double>::infinity(), 0, 0, 0};
+    for (std::size_t b = 0; b < kRatios.size(); ++b)
+      for (std::size_t a = b; a < kRatios.size(); ++a) {
+        const double all = rss(own_squares, own_in_sessions, a) +
+                           rss(squares.sum() - own_squares, all_in_sessions - own_in_sessions, b);
+        const double likelihood = -0.5 * dof * std::log(all / dof) - determinant(a) - others * determinant(b);
+        if (a == b) alike = std::max(alike, likelihood);
+        if (likelihood > best.gain) best = {likelihood, a, b, all / dof};
+      }
+    best.gain -= alike;
+    return best;
+  }
+
+ private:
+  const MixedModel& model_;
+  const std::size_t stratum_;
+  const SessionDirections sessions_;
+};
+
+/// Unit vectors that are orthogonal to `direction`, of length 1.
+MatrixXd others_than(const VectorXd& direction) {
+  MatrixXd columns = MatrixXd::Identity(direction.size(), direction.size());
+  columns.col(0) = direction;
+  const MatrixXd q = Eigen::HouseholderQR<MatrixXd>(columns).householderQ();
+  return q.rightCols(q.cols() - 1);
+}
+
+/// A rotor whose sessions differ more: how much an offset of it is of the directions still alike, and how
+/// they split.
+struct Unlike {
+  Index rotor = 0;
+  VectorXd direction;  // among the differences
+  double share = 1;
+  Differences::Split split;
+};
+
+/// In modes, with R the runs' covariance and S that of sessions: W with WᵀRW and WᵀSW diagonal. The
+/// first column is the most of what rotors have in common; the last are what the unlike have no part in.
+MatrixXd uncorrelated(const MatrixXd& modes, const NullFit& fit, const std::vector<Unlike>& unlike,
+                      const MatrixXd& alike) {
+  const Index c = modes.cols(), k = static_cast<Index>(unlike.size()) + 1;
+  const double runs = unlike.back().split.variance, common_runs = std::pow(fit.sigma[0], 2);
+  const double others = kRatios[unlike.back().split.others] * runs;
+  VectorXd of_runs = VectorXd::Constant(c, runs);
+  of_runs(0) = common_runs;
+  MatrixXd of_sessions = VectorXd::Constant(c, others).asDiagonal();
+  double common = kRatios[fit.ratio[0]] * common_runs;
+  for (const Unlike& u : unlike) {
+    const double more = std::max(0.0, kRatios[u.split.own] * u.split.variance - others) / u.share;
+    const RowVectorXd offset = modes.row(u.rotor);
+    of_sessions += more * offset.transpose() * offset;
+    common -= more * offset(0) * offset(0);
+  }
+  of_sessions(0, 0) += std::max(0.0, common) - others;
+  MatrixXd basis = MatrixXd::Zero(c, c);
+  basis(0, 0) = 1;
+  for (Index i = 1; i < k; ++i) basis.col(i).tail(c - 1) = unlike[static_cast<std::size_t>(i - 1)].direction;
+  basis.bottomRightCorner(c - 1, c - k) = alike;
+  const MatrixXd span = basis.leftCols(k);
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(
+      span.transpose() * of_sessions * span, span.transpose() * of_runs.asDiagonal() * span);
+  MatrixXd own = solver.eigenvectors();
+  Index most = 0;
+  own.row(0).cwiseAbs().maxCoeff(&most);
+  own.col(0).swap(own.col(most));
+  basis.leftCols(k) = span * own.colwise().normalized();
+  return basis;
+}
+
+}  // namespace
+
+RotorSessions rotor_sessions(const Observations& observations, const std::vector<int>& rows,
+                             const Components& residual, std::mt19937_64& random) {
+  const MixedModel model(observations, rows);
+  const Index channels = observations.channels();
+  if (channels < static_cast<Index>(kFewestToCompare) || model.ratios() == 1) return {};
+  std::size_t s = 0;
+  while (!model.strata()[s].means() || model.strata()[s].side() == 0) ++s;
+  const NullFit fit = CandidateScan(model, {}, {}).null_fit(residual);
+  const Differences differences(model, s);
+  const Stacked column = model.stack(s, {&residual});
+  const Stacked sets = model.simulate_unit(s, fit.ratio[s], kAlikeSets, model.run_correlation(s), random);
+  MatrixXd alike = MatrixXd::Identity(channels - 1, channels - 1);
+  std::vector<Unlike> found;
+  while (channels - static_cast<Index>(found.size()) >= static_cast<Index>(kFewestToCompare)) {
+    const auto most_unlike = [&](const Stacked& set) {
+      const Differences::Data data = differences.data(set, alike);
+      Unlike most{.split = {.gain = -1}};
+      for (Index rotor = 0; rotor < channels; ++rotor) {
+        const bool known = std::ranges::any_of(found, [&](const Unlike& u) { return u.rotor == rotor; });
+        if (known) continue;
+        const VectorXd offset =
+            alike.transpose() * model.mode_matrix().row(rotor).tail(channels - 1).transpose();
+        const Differences::Split split = differences.split(data, offset.normalized());
+        if (split.gain > most.split.gain)
+          most = {rotor, alike * offset.normalized(), offset.squaredNorm(), split};
+      }
+      return most;
+    };
+    const Unlike most = most_unlike(column);
+    bool by_chance = most.split.gain <= 0;
+    for (Index i = 0; i < sets.cols() && !by_chance; ++i)
+      by_chance = most_unlike(sets.col(i)).split.gain >= most.split.gain;
+    if (by_chance) break;
+    alike = alike * others_than(alike.transpose() * most.direction);
+    found.push_back(most);
+  }
+  if (found.empty()) return {};
+  RotorSessions result{.modes = model.mode_matrix() * uncorrelated(model.mode_matrix(), fit, found, alike),
+                       .alone = static_cast<int>(found.size()) + 1,
+                       .rotors = {}};
+  for (const Unlike& unlike : found) result.rotors.push_back(static_cast<int>(unlike.rotor));
+  return result;
+}
+
+}  // namespace tunnelrig
