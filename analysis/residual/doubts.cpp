@@ -31,9 +31,6 @@ void warn_of_doubts(Explanation& explanation) {
       explanation.warnings.push_back(
           fmt::format("{}: its {} is {:.4g} to {:.4g}, and theory says {:.4g}: something else goes with it",
                       adopted.term.label(), amplitude.name, amplitude.low, amplitude.high, *theory));
-    if (amplitude.theory && amplitude.low <= 0 && amplitude.high >= 0)
-      explanation.warnings.push_back(
-          fmt::format("{}: the data alone do not tell its {} from 0", adopted.term.label(), amplitude.name));
   }
   const bool worse = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
   if (const SealedErrors& sealed = explanation.sealed;

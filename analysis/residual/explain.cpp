@@ -105,6 +105,7 @@ bool worse(double error, double than) { return error > 1.1 * than; }
 struct Refuted {
   std::vector<Term> terms;
   std::vector<std::string> why;  // of each of `terms`
+  bool at_bound = false;         // one of them
   bool all = false;
   bool any() const { return all || !terms.empty(); }
 };
@@ -118,6 +119,7 @@ Refuted refuted(const Explanation& explanation) {
     if (why.empty()) continue;
     result.terms.push_back(adopted.term);
     result.why.push_back(why);
+    result.at_bound |= adopted.at_bound;
   }
   result.all = result.terms.empty() && refutable &&
                worse(explanation.sealed.all, explanation.sealed.curves) && explanation.sealed.against_names;
@@ -129,9 +131,9 @@ std::string taken_back_all(const Explanation& explanation) {
   for (const AdoptedEffect& adopted : explanation.adopted)
     if (!adopted.term.effect->theory_only) names.push_back(adopted.term.label());
   return fmt::format(
-      "{} found and taken back: the error of the sealed blocks is {:.4g} {} with {}, {:.4g} without",
-      fmt::join(names, ", "), explanation.sealed.all, explanation.unit, names.size() > 1 ? "them" : "it",
-      explanation.sealed.curves);
+      "{} found and taken back: the error of the sealed blocks is {:.4g}{} with {}, {:.4g} without",
+      fmt::join(names, ", "), explanation.sealed.all, explanation.unit == "1" ? "" : " " + explanation.unit,
+      names.size() > 1 ? "them" : "it", explanation.sealed.curves);
 }
 
 /// Once more without the names that are refuted: what they did may be structure whose cause is not known.
@@ -147,7 +149,7 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
     if (found.all) std::erase_if(fewer, [](const Effect* effect) { return !effect->theory_only; });
     Explanation without = explain_once(observations, fewer, stricter);
     without.untestable = explanation.untestable;
-    const bool stay = worse(explanation.sealed.curves, explanation.sealed.all) &&
+    const bool stay = !found.at_bound && worse(explanation.sealed.curves, explanation.sealed.all) &&
                       worse(without.sealed.names, explanation.sealed.all);
     if (found.all) said.push_back(taken_back_all(explanation));
     for (std::size_t k = 0; k < found.terms.size(); ++k)

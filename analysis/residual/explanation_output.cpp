@@ -189,9 +189,9 @@ std::string explanation_json(const Explanation& e) {
 
 std::string explanation_text(const Explanation& e) {
   const std::string unit = e.unit.empty() || e.unit == "1" ? "" : " " + e.unit;
-  std::string text = fmt::format("{}{}response {}, baseline {}, {} runs in {} blocks\n\n{}: {}\n", e.campaign,
-                                 e.campaign.empty() ? "" : ": ", e.response, e.baseline, e.runs, e.blocks,
-                                 e.verdict, verdict_in_words(e.verdict));
+  std::string text = fmt::format("{}{}response {}, baseline {}, {} runs in {} block{}\n\n{}: {}\n",
+                                 e.campaign, e.campaign.empty() ? "" : ": ", e.response, e.baseline, e.runs,
+                                 e.blocks, e.blocks == 1 ? "" : "s", e.verdict, verdict_in_words(e.verdict));
   for (const AdoptedEffect& a : e.adopted) {
     text += fmt::format("\n  {}   p = {:.3g}\n    {}\n    {}\n", a.term.label(), a.p_value,
                         a.term.effect->formula, parameters_in_words(a));

@@ -45,9 +45,6 @@ class Search {
   // named effects: search_effects.cpp
   void add_effects();
   static bool already_in(const Term& way, const MeanModel& model);
-  /// Whether a step of the same rotors is nearer than a step may be to the campaign's ends: what lies between
-  /// is a few runs.
-  bool is_beside_a_step(const Term& way, const MeanModel& model) const;
   /// All candidates on top of a model, but for what it has, with one amplitude for all groups.
   Scan scan_effects(const JointFit& base) const;
   /// And with an amplitude of each group's own.
@@ -90,11 +87,6 @@ class Search {
   bool another_does_as_well(const CrossValidation& own, const NullFit& variances) const;
   /// Whether it is one of the measured speed, of which the model does not have the square.
   bool lacks_speed_squared(const Term& term) const;
-  /// Both are several times what they make together.
-  bool cancel(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) const;
-  /// The effect of the same condition and rotors that the fit's newest term takes back, or curves that do:
-  /// such a sum is a shape and no two causes.
-  std::optional<std::string> cancelled_by(const JointFit& fit) const;
   /// Of a term that is a step, counted from the newest (1): from the run on where it is likeliest.
   JointFit at_best_run(JointFit fit, std::size_t from_newest) const;
   // several of which none can be seen alone: search_several.cpp
@@ -163,14 +155,13 @@ class Search {
   /// Whether the newest curve, over a covariate of this effect, has more of the effect's size than its
   /// formula may leave: then the effect was only the curve's straight part.
   bool outshone_by_curve(const Term& term) const;
-  /// Whether the curves, whatever they are over, undo most of what an effect does: beside each other both can
-  /// have any size.
-  bool is_taken_back_by_curves(const Term& term, const JointFit& fit) const;
-  /// By those of a fit from the first that is named on.
-  Eigen::MatrixXd made_by_curves(const JointFit& fit, std::size_t first) const;
+  Eigen::MatrixXd made_by_newest_curve() const;
   void add_curve(const Curve& curve, double p);
-  /// Whether a curve over the same covariate and rotor is in.
+  /// Whether a curve over the same covariate and rotor is in, or over one that goes with it.
   bool is_described(const Curve& curve) const;
+  /// Whether what it is over is all but told by what a found one is over: beside each other both could have
+  /// any size.
+  bool go_together(const Curve& found, const Curve& curve) const;
   /// Takes accepted effect t out; `without` is the fit without it.
   void drop(std::size_t t, const JointFit& without);
   /// The same, and gives the newest curve the straight part that no name takes any more.
@@ -182,8 +173,6 @@ class Search {
   double share_beside(const Curve& curve, const Term& term) const;
   /// Whether a curve does nearly all that an effect's conditions do, so that a name beside it means nothing.
   bool is_work_of_a_curve(const Term& term) const;
-  /// Effects whose own covariate bends away from their formula give way to a curve.
-  void doubt_formulas();
   /// Of which rotor; −1: of what several do; nothing where it is not.
   std::optional<int> session_scatter_is_large() const;
 

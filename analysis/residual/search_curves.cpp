@@ -15,7 +15,6 @@ namespace {
 /// the covariate does. One with a time constant or a length can bend towards the curve, and must do less than
 /// it.
 constexpr double kMostLeft = 0.3, kMostLeft_bending = 1;
-constexpr double kDoubtedP = 0.01;  // of a bend beside an effect, tested alone
 
 }  // namespace
 
@@ -26,7 +25,6 @@ void Search::add_curves(const CurveScan& first) {
     add_effects();
     added = static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve(scan_curves());
   }
-  doubt_formulas();
 }
 
 Search::CurveScan Search::scan_curves() const {
@@ -68,9 +66,18 @@ bool Search::add_best_curve(const CurveScan& curves) {
 
 bool Search::is_described(const Curve& curve) const {
   return std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
-    return found.curve.covariate == curve.covariate && found.curve.place.name == curve.place.name &&
+    return (found.curve.covariate == curve.covariate || go_together(found.curve, curve)) &&
+           found.curve.place.name == curve.place.name &&
            (found.curve.rotor < 0 || found.curve.rotor == curve.rotor);
   });
+}
+
+bool Search::go_together(const Curve& found, const Curve& curve) const {
+  constexpr double kLittle = 0.02;  // of its variance
+  const bool comparable =
+      found.x.cols() == 1 && curve.x.cols() == 1 && found.labels.empty() && curve.labels.empty();
+  return comparable &&
+         share_beside_cubics(observations_, rows_, {found.x(rows_, 0)}, curve.x(rows_, 0)) < kLittle;
 }
 
 void Search::add_curve(const Curve& curve, double p) {
@@ -106,56 +113,17 @@ void Search::smooth_curves() {
   }
 }
 
-/// That the response depends on the covariate is settled; this asks whether it does so by the formula. The
-/// test is one bend for one effect, and needs no maximum over everything.
-void Search::doubt_formulas() {
-  for (std::size_t t = result_.accepted.size(); t-- > 0;) {
-    if (t >= result_.accepted.size()) continue;  // gone with another
-    const Term term = result_.accepted[t].term;
-    if (term.per_group || term.effect->theory_only || term.effect->parameters.size() > 1 ||
-        static_cast<int>(result_.curves.size()) >= settings_.most_curves)
-      continue;
-    for (const Curve& curve : curves_) {
-      if (!is_bend_over(curve, conditions_of(*term.effect), term.rotor) || is_described(curve)) continue;
-      const Curve bend = without_trend(curve, rows_);
-      Scan scan;
-      scan.candidates.push_back(as_candidate(bend));
-      if (!mixed_->sees(scan.candidates[0].columns[0])) continue;
-      rank(fit_, scan);
-      const double p =
-          NullMaxima(*scan.scan, fit_.variances, sizes_beside(fit_, scan.candidates[0], scan.fits[0]),
-                     settings_, 2000 + ++salt_)
-              .p(scan.fits[0].evidence);
-      if (p > kDoubtedP) continue;
-      const JointFit before = fit_;
-      add_curve(bend, p);
-      if (outshone_by_curve(term)) {
-        give_way_to_curve(t, fit_without(t));
-        break;
-      }
-      result_.curves.pop_back();
-      fit_ = before;
-      read_back_terms();
-    }
-  }
-}
-
 void Search::drop_what_a_curve_replaces() {
   for (std::size_t t = result_.accepted.size(); t-- > 0;) {
-    if (t >= result_.accepted.size()) continue;  // gone with another
     const Term term = result_.accepted[t].term;
     // Those of groups stand in the baseline; that forces go with the square of the speed is not in doubt.
     if (term.per_group || term.effect->theory_only) continue;
-    const bool outshone = outshone_by_curve(term);
-    const JointFit without = fit_without(t);
     // What two conditions do together is not what one of them does.
     const bool product = result_.curves.back().curve.strength.has_value();
-    if (!outshone && !at_bound(fit_, term) && !is_taken_back_by_curves(term, fit_) &&
-        (product || is_still_found(term, without)))
-      continue;
-    if (outshone)
+    const JointFit without = fit_without(t);
+    if (outshone_by_curve(term))
       give_way_to_curve(t, without);
-    else
+    else if (!product && !is_still_found(term, without))
       drop(t, without);
   }
 }
@@ -180,12 +148,6 @@ void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
   found.instead_of.push_back(result_.accepted[t].term.effect->name);
   drop(t, without);
   found.curve = with_trend(found.curve);
-  for (std::size_t other = result_.accepted.size(); other-- > 0;) {
-    const Term& term = result_.accepted[other].term;
-    if (term.effect->theory_only || !is_work_of_a_curve(term)) continue;
-    found.instead_of.push_back(term.effect->name);
-    drop(other, fit_without(other));
-  }
   fit_.model.curves.back() = found.curve;
   fit_ = fit_jointly(observations_, fit_.model, rows_);
   read_back_terms();
@@ -201,8 +163,14 @@ std::vector<std::string> Search::conditions_of(const Effect& effect) const {
 double Search::share_beside(const Curve& curve, const Term& term) const {
   const Eigen::Index channel = std::max(term.rotor, 0), of_curve = curve.x.cols() > 1 ? channel : 0;
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
-  return share_beside_cubics(observations_, rows_, {curve.x(rows_, of_curve)},
-                             respond(term, observations_, predicted).derivative[0][0](rows_, channel));
+  const Eigen::VectorXd column = respond(term, observations_, predicted).derivative[0][0](rows_, channel);
+  const auto share = [&](const Eigen::VectorXd& of) {
+    return share_beside_cubics(observations_, rows_, {curve.x(rows_, of_curve)}, of);
+  };
+  if (observations_.multiplicative) return share(column);
+  // What an effect adds goes with the force as well, or with the conditions alone.
+  const Eigen::VectorXd of_force = column.cwiseQuotient(predicted(rows_, channel));
+  return std::min(share(column), of_force.allFinite() ? share(of_force) : 1.0);
 }
 
 bool Search::is_work_of_a_curve(const Term& term) const {
@@ -219,28 +187,21 @@ bool Search::is_work_of_a_curve(const Term& term) const {
 bool Search::outshone_by_curve(const Term& term) const {
   const Curve& curve = result_.curves.back().curve;
   if (curve.tilt.empty() || !is_over(curve, conditions_of(*term.effect))) return false;
-  const Eigen::MatrixXd drawn = made_by_curves(fit_, fit_.model.curves.size() - 1);
+  const Eigen::MatrixXd drawn = made_by_newest_curve();
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
   const double most = term.effect->parameters.size() > 1 ? kMostLeft_bending : kMostLeft;
   return rms_of(drawn) > most * rms_of(respond(term, observations_, predicted).value[0]);
 }
 
-Eigen::MatrixXd Search::made_by_curves(const JointFit& fit, std::size_t first) const {
-  const Eigen::VectorXd amplitude = fit_amplitudes(observations_, difference(y_, fit.linear.offset),
-                                                   fit.linear.columns, fit.variances, rows_)
-                                        .amplitude;
+Eigen::MatrixXd Search::made_by_newest_curve() const {
+  const auto& columns = fit_.model.curves.back().columns;  // the last of the fit
+  const Eigen::VectorXd amplitude = fit_amplitudes(observations_, difference(y_, fit_.linear.offset),
+                                                   fit_.linear.columns, fit_.variances, rows_)
+                                        .amplitude.tail(std::ssize(columns));
   Eigen::MatrixXd made = Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels());
-  std::size_t column = fit.linear.columns.size();  // the curves' are the last
-  for (std::size_t c = fit.model.curves.size(); c-- > first;)
-    for (std::size_t k = fit.model.curves[c].columns.size(); k-- > 0;)
-      made += amplitude(static_cast<Eigen::Index>(--column)) * fit.model.curves[c].columns[k][0];
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    made += amplitude(static_cast<Eigen::Index>(k)) * columns[k][0];
   return made;
-}
-
-bool Search::is_taken_back_by_curves(const Term& term, const JointFit& fit) const {
-  if (fit.model.curves.empty()) return false;
-  const Eigen::MatrixXd predicted = predict_response(observations_, fit.model, rows_);
-  return cancel(respond(term, observations_, predicted).value[0], made_by_curves(fit, 0));
 }
 
 std::optional<int> Search::session_scatter_is_large() const {

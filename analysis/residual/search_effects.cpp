@@ -1,14 +1,12 @@
 // Named effects: ranked, tried, accepted one by one.
 #include "analysis/residual/null_maxima.h"
 #include "analysis/residual/search.h"
-#include "analysis/residual/step_profile.h"
 #include "calibration/distributions.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <set>
 
 #include <fmt/format.h>
 
@@ -58,21 +56,6 @@ bool Search::already_in(const Term& way, const MeanModel& model) {
   });
 }
 
-bool Search::is_beside_a_step(const Term& way, const MeanModel& model) const {
-  if (!way.effect->has_change_point()) return false;
-  const int at = first_row_of(way);
-  return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
-    if (!term.effect->has_change_point() || (way.rotor >= 0 && term.rotor >= 0 && way.rotor != term.rotor))
-      return false;
-    const int other = first_row_of(term);
-    std::set<int> between;
-    for (const int row : rows_)
-      if (row >= std::min(at, other) && row < std::max(at, other))
-        between.insert(observations_.block[static_cast<std::size_t>(row)]);
-    return other != at && static_cast<int>(between.size()) < kLeastBlocksBesideAStep;
-  });
-}
-
 Search::Scan Search::scan_effects(const JointFit& base) const {
   Scan scan = list_effects(base);
   rank(base, scan);
@@ -83,7 +66,7 @@ Search::Scan Search::list_effects(const JointFit& base) const {
   Scan scan;
   const Eigen::MatrixXd predicted = predict_response(observations_, base.model, rows_);
   for (const Term& way : ways_) {
-    if (already_in(way, base.model) || is_beside_a_step(way, base.model) || is_work_of_a_curve(way)) continue;
+    if (already_in(way, base.model) || is_work_of_a_curve(way)) continue;
     Candidate candidate = candidate_of(way, predicted);
     if (!mixed_->sees(candidate.columns[0])) continue;
     scan.ways.push_back(way);
@@ -224,8 +207,6 @@ std::optional<std::string> Search::why_not(const JointFit& fit, const CrossValid
     return fmt::format("{} does not predict unseen blocks", term.label());
   if (lacks_speed_squared(term))
     return fmt::format("{} without rotor_speed is no way of the speed", term.label());
-  if (const auto other = cancelled_by(fit))
-    return fmt::format("{} and {} would cancel each other", term.label(), *other);
   if (const auto shared = only_bends(term, fit.variances, after))
     return fmt::format("{} is no more than a bend over {}", term.label(), *shared);
   if (term.effect->has_change_point() && is_gradual({term}, fit.variances, after))

@@ -9,38 +9,17 @@ namespace tunnelrig {
 
 using Eigen::Index;
 
-/// The baseline has the nominal speed, so what the measured speed does begins with its square. A weaker
-/// dependence without it is a reading that scatters, or something else.
+/// The baseline of a campaign has the nominal speed, and a table's law over a throttle none, so what the
+/// measured speed does begins with its square. A weaker dependence without it is a reading that scatters, or
+/// something else.
 bool Search::lacks_speed_squared(const Term& term) const {
   const auto& covariates = term.effect->covariates;
   const bool of_speed = std::find(covariates.begin(), covariates.end(), "speed_rpm") != covariates.end();
-  return !observations_.from_table && of_speed && term.effect->name != "rotor_speed" &&
+  const auto is_square = [](const Term& way) { return way.effect->name == "rotor_speed"; };
+  const bool has_none = !observations_.from_table || std::ranges::any_of(ways_, is_square);
+  return has_none && of_speed && term.effect->name != "rotor_speed" &&
          std::none_of(result_.accepted.begin(), result_.accepted.end(),
                       [](const Accepted& accepted) { return accepted.term.effect->name == "rotor_speed"; });
-}
-
-bool Search::cancel(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) const {
-  constexpr double kMost = 2;
-  return std::min(rms_of(one), rms_of(other)) > kMost * rms_of(one + other);
-}
-
-std::optional<std::string> Search::cancelled_by(const JointFit& fit) const {
-  const MeanModel& model = fit.model;
-  const Term& newest = model.terms.back();
-  if (newest.per_group) return {};
-  if (is_taken_back_by_curves(newest, fit)) return "the curves";
-  const Eigen::MatrixXd predicted = predict_response(observations_, model, rows_);
-  const auto made_by = [&](const Term& term) { return respond(term, observations_, predicted).value[0]; };
-  const auto names = conditions_of(*newest.effect);
-  for (auto other = model.terms.begin(); other + 1 != model.terms.end(); ++other) {
-    const auto theirs = conditions_of(*other->effect);
-    const bool shared = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
-      return std::find(theirs.begin(), theirs.end(), name) != theirs.end();
-    });
-    if (!shared || other->per_group || other->rotor != newest.rotor) continue;
-    if (cancel(made_by(newest), made_by(*other))) return other->label();
-  }
-  return {};
 }
 
 std::optional<std::string> Search::only_bends(const Term& term, const NullFit& variances,

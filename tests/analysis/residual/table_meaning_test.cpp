@@ -21,6 +21,7 @@ using testing::Not;
 TEST(PartsOfEqualSize, EqualValuesAreInOnePart) {
   EXPECT_THAT(parts_of_equal_size({4, 1, 3, 2}, 2), ElementsAre(1, 0, 1, 0));
   EXPECT_THAT(parts_of_equal_size({1, 1, 1, 2, 2, 2}, 6), ElementsAre(0, 0, 0, 1, 1, 1));
+  EXPECT_THAT(parts_of_equal_size({1, 1, 1, 1, 1, 2, 3, 3}, 3), ElementsAre(0, 0, 0, 0, 0, 1, 2, 2));
   EXPECT_THAT(parts_of_equal_size({5, 5, 5}, 3), ElementsAre(0, 0, 0));
   EXPECT_THAT(parts_of_equal_size({7, 8}, 100), ElementsAre(0, 1));
 }
