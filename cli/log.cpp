@@ -3,10 +3,8 @@
 #include "cli/verb.h"
 #include "datasets/campaign_file.h"
 #include "datasets/error.h"
-#include "datasets/raw_store.h"
 
 #include <csignal>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -60,30 +58,15 @@ int run_one(const LogOptions& options) {
                         "");
 }
 
-/// A file that this call made and recorded nothing to would only be in the way.
-void remove_if_without_runs(const std::string& db) {
-  std::error_code error;
-  if (!std::filesystem::exists(db, error)) return;
-  {
-    const CampaignFile file(db, CampaignFile::Access::kRead);
-    if (!raw_runs(file).empty()) return;
-  }
-  for (const auto& file : files_of_campaign(db)) std::filesystem::remove(file, error);
-}
-
 int run_log(const LogOptions& options) {
   if (!(options.duration_s > 0)) throw InputError("--duration: seconds, above 0");
   if (!options.listen.empty() && !options.live_port)
     throw InputError("--listen says from where the live page can be reached; it goes with --live");
   std::signal(SIGINT, stop_on_signal);
   std::signal(SIGTERM, stop_on_signal);
-  const bool fresh = !std::filesystem::exists(options.db);
   try {
     if (options.live_port) return run_live(options);
     return options.plan.empty() ? run_one(options) : run_plan(options);
-  } catch (const InputError&) {
-    if (fresh) remove_if_without_runs(options.db);
-    throw;
   } catch (const StorageError& error) {
     if (!error.disk_full()) throw;
     throw StorageError(fmt::format("the disk is full ({}). The run ends here as partial; everything before "

@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <set>
 #include <tuple>
 
@@ -42,6 +43,18 @@ const LogOptions& checked(const LogOptions& options) {
 }
 
 }  // namespace
+
+Logging::Leftover::~Leftover() {
+  if (!file.made() || std::uncaught_exceptions() == errors) return;
+  try {
+    if (!raw_runs(file).empty()) return;
+  } catch (const StorageError&) {
+    return;
+  }
+  std::error_code error;  // the lock's own file goes with the lock
+  for (const char* suffix : {"", "-wal", "-shm"})
+    std::filesystem::remove(file.path().string() + suffix, error);
+}
 
 Logging::Logging(const LogOptions& options)
     : options_(checked(options)), file_(options.db, CampaignFile::Access::kRecord) {

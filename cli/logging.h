@@ -10,6 +10,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -82,8 +83,17 @@ class Logging {
   void show(ProgressBar& bar, const LogProgress& progress) const;
   int report(const std::string& name, const PlannedRun& planned, const LogOutcome& outcome) const;
 
+  /// Where an error ends the call, a file that it made and recorded nothing to would only be in the way. It
+  /// goes while file_ still holds the lock: a moment later it may be another recorder's.
+  struct Leftover {
+    CampaignFile& file;
+    const int errors = std::uncaught_exceptions();
+    ~Leftover();
+  };
+
   LogOptions options_;
   CampaignFile file_;
+  Leftover leftover_{file_};
   CampaignInfo info_;
   std::optional<Certificate> certificate_;
   std::optional<live::CellKnowledge> cells_;  // of the alarms, once a run has ended

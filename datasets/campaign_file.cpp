@@ -142,9 +142,10 @@ CampaignFile::CampaignFile(const std::filesystem::path& path, Access access) : p
   }
   if (access == Access::kRecord) {
     lock_ = lock_for_recording(path);
+    made_ = !std::filesystem::exists(path, error);
     for (const std::string_view suffix :
          {"-wal", "-shm"}) {  // left behind by a file that was removed by hand
-      if (!std::filesystem::exists(path, error)) std::filesystem::remove(with_suffix(path, suffix), error);
+      if (made_) std::filesystem::remove(with_suffix(path, suffix), error);
     }
   }
   // A reader that may write opens for writing all the same: SQLite lets only such a connection fold the

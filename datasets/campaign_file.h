@@ -50,6 +50,9 @@ class CampaignFile {
 
   const std::filesystem::path& path() const { return path_; }
 
+  /// True where this connection made the file, and not merely opened it.
+  bool made() const { return made_; }
+
   /// True where neither a campaign nor a table has been put in.
   bool empty() const;
 
@@ -103,6 +106,7 @@ class CampaignFile {
 
   std::filesystem::path path_;
   std::shared_ptr<void> lock_;  // held by a recorder
+  bool made_ = false;
   std::unique_ptr<Database> database_;
 };
 

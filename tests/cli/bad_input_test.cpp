@@ -1,14 +1,18 @@
 // Bad input: a message that names file, line and rule, exit code 2, nothing half-written.
 #include "cli/program.h"
+#include "datasets/campaign_file.h"
 #include "datasets/csv.h"
 #include "support/example_campaign.h"
 #include "support/temporary_folder.h"
 
 #include <cstdlib>
+#include <fstream>
 #include <functional>
+#include <future>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 namespace tunnelrig {
 namespace {
@@ -186,6 +190,24 @@ TEST_F(BadInput, ALogThatFailsLeavesNoFile) {
   EXPECT_THAT(refusal_of(log + "--location Q9 --speed max", {}),
               HasSubstr("does not know the location 'Q9'"));
   EXPECT_THAT(refusal_of(log + "--location OT --campaign none.toml", {}), HasSubstr("none.toml"));
+}
+
+/// The file is made between this call's start and its refusal: it is not this call's to take away.
+TEST_F(BadInput, ALogThatFailsLeavesTheFileOfAnotherRecorder) {
+  ASSERT_EQ(::mkfifo((folder / "plan.csv").c_str(), 0600), 0);
+  auto refused = std::async(std::launch::async, [&] {
+    return test::run_program(folder.path(), "log --db c.db --plan plan.csv --yes --speed max");
+  });
+  std::ofstream plan(folder / "plan.csv");  // opens once the program reads it
+  CampaignFile other(folder / "c.db", CampaignFile::Access::kRecord);
+  other.set_text("campaign.toml", reference_campaign_toml());
+  plan << "session,location,repeat\nS1,OT,1\n";
+  plan.close();
+  const ProgramResult result = refused.get();
+  EXPECT_EQ(result.code, 2);
+  EXPECT_THAT(result.error, HasSubstr("is being recorded to by process"));
+  EXPECT_TRUE(fs::exists(folder / "c.db"));
+  EXPECT_TRUE(fs::exists(folder / "c.db.lock"));
 }
 
 TEST_F(BadInput, OutputThatCannotBeWritten) {
