@@ -102,7 +102,7 @@ int Logging::record(const PlannedRun& planned, const std::string& note, const Lo
   cells.emplace_back("start_utc", format_utc(start_s));
   cells.emplace_back("raw", fmt::format("raw/{}.npy", name));
   if (planned.kind == RunKind::kTare) cells.emplace_back("kind", "tare");
-  if (planned.y_norm)
+  if (planned.y_norm && planned.z_norm)
     cells.insert(cells.end(), {{"y_norm", cell(*planned.y_norm)}, {"z_norm", cell(*planned.z_norm)}});
   cells.insert(cells.end(), conditions_.begin(), conditions_.end());
   cells.emplace_back("source", options_.source);

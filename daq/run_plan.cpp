@@ -108,6 +108,21 @@ class PlanWriter {
   std::map<std::string, int> anchors_;
 };
 
+/// Coordinates that no run sheet can hold would make every run of the file unreadable.
+std::optional<double> coordinate(const Sheet& sheet, std::size_t row, const char* column) {
+  const auto value = sheet.number(row, column);
+  if (!value) return {};
+  if (const std::string why = outside_range(column, *value); !why.empty())
+    throw InputError(fmt::format("{}: {}", sheet.where(row, column), why));
+  return value;
+}
+
+void check_both_or_neither(const Sheet& sheet, std::size_t row, std::optional<double> y_norm,
+                           std::optional<double> z_norm) {
+  if (y_norm.has_value() != z_norm.has_value())
+    throw InputError(fmt::format("{}: one of y_norm and z_norm is missing", sheet.place(row)));
+}
+
 }  // namespace
 
 PlanSettings thesis_plan() {
@@ -166,8 +181,9 @@ std::vector<PlannedRun> parse_plan(const Sheet& sheet) {
       throw InputError(
           fmt::format("{}: {:g} s is no duration of a run", sheet.where(row, "duration_s"), run.duration_s));
     }
-    run.y_norm = sheet.number(row, "y_norm");
-    run.z_norm = sheet.number(row, "z_norm");
+    run.y_norm = coordinate(sheet, row, "y_norm");
+    run.z_norm = coordinate(sheet, row, "z_norm");
+    check_both_or_neither(sheet, row, run.y_norm, run.z_norm);
     if (!seen.emplace(run.session, run.kind, run.location, run.repeat).second) {
       throw InputError::at(sheet.file, sheet.rows[row].line, "session {}, {} {}, repeat {} is planned twice",
                            run.session, kind.empty() ? "thrust" : kind, run.location, run.repeat);
@@ -182,13 +198,11 @@ std::vector<PlannedLocation> parse_locations(const Sheet& sheet) {
   sheet.require("location");
   std::vector<PlannedLocation> locations;
   for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
-    PlannedLocation location{sheet.text(row, "location"), sheet.number(row, "y_norm"),
-                             sheet.number(row, "z_norm")};
+    PlannedLocation location{sheet.text(row, "location"), coordinate(sheet, row, "y_norm"),
+                             coordinate(sheet, row, "z_norm")};
     if (location.label.empty())
       throw InputError(fmt::format("{}: must not be empty", sheet.where(row, "location")));
-    if (location.y_norm.has_value() != location.z_norm.has_value()) {
-      throw InputError::at(sheet.file, sheet.rows[row].line, "one of y_norm and z_norm is missing");
-    }
+    check_both_or_neither(sheet, row, location.y_norm, location.z_norm);
     locations.push_back(location);
   }
   if (locations.empty()) throw InputError::in(sheet.file, "names no location");

@@ -103,5 +103,23 @@ TEST(Plan, NamesWhatIsWrong) {
               HasSubstr("one of y_norm and z_norm"));
 }
 
+/// What no run sheet can hold would make the whole campaign file unreadable.
+TEST(Plan, CoordinatesAreThoseThatARunSheetCanHold) {
+  for (const char* row : {"5,0.5", "0.5,-1.2"}) {
+    const std::string csv = fmt::format("session,location,repeat,y_norm,z_norm\nS1,far,1,{}\n", row);
+    EXPECT_THAT(message_of([&] { parse_plan(parse_csv(csv, "plan.csv")); }),
+                HasSubstr("normalised tunnel coordinates lie between -1 and 1"));
+    EXPECT_THAT(message_of([&] {
+                  parse_locations(parse_csv(fmt::format("location,y_norm,z_norm\nfar,{}\n", row), "l.csv"));
+                }),
+                HasSubstr("normalised tunnel coordinates lie between -1 and 1"));
+  }
+  for (const char* row : {"0.5,", ",0.5"}) {
+    const std::string csv = fmt::format("session,location,repeat,y_norm,z_norm\nS1,half,1,{}\n", row);
+    EXPECT_THAT(message_of([&] { parse_plan(parse_csv(csv, "plan.csv")); }),
+                HasSubstr("plan.csv:2: one of y_norm and z_norm is missing"));
+  }
+}
+
 }  // namespace
 }  // namespace tunnelrig
