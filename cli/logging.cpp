@@ -31,6 +31,20 @@ double now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
+/// Of the next run: an import brings names and raw files of its own, which may be R0002 and raw/R0002.npy.
+std::string free_name(const CampaignFile& file) {
+  const Sheet runs = file.sheet("runs").value_or(Sheet());
+  std::set<std::string> taken;
+  for (std::size_t row = 0; row < runs.rows.size(); ++row) {
+    const std::filesystem::path raw(runs.text(row, "raw"));
+    taken.insert({runs.text(row, "run"), raw.lexically_normal().replace_extension().string()});
+  }
+  for (std::size_t number = runs.rows.size() + 1;; ++number) {
+    std::string name = fmt::format("R{:04}", number);
+    if (!taken.contains(name) && !taken.contains("raw/" + name)) return name;
+  }
+}
+
 /// What no run sheet could hold would make every run of the file unreadable: it is refused before there is
 /// one.
 const LogOptions& checked(const LogOptions& options) {
@@ -82,8 +96,7 @@ Logging::Logging(const LogOptions& options)
 }
 
 int Logging::record(const PlannedRun& planned, const std::string& note, const LogWatch& watch) {
-  const auto runs = file_.sheet("runs");
-  const std::string name = fmt::format("R{:04}", (runs ? runs->rows.size() : 0) + 1);
+  const std::string name = free_name(file_);
   double start_s = now_s();
   std::unique_ptr<PacketSource> board;
   RunCells cells = {{"run", name},

@@ -12,6 +12,7 @@
 #include <deque>
 #include <fstream>
 #include <future>
+#include <map>
 #include <memory>
 #include <system_error>
 
@@ -262,20 +263,39 @@ void export_raw_run(const CampaignFile& file, const RawRun& raw, const fs::path&
   if (!sink.gaps().empty()) write_text(gaps_path(path), format_csv(gap_sheet(sink.gaps())));
 }
 
+using RecordingsByPath = std::map<fs::path, std::string>;  // path without extension: a hash
+
+/// As the row says; where another recording is there already, another name beside it.
+std::string path_of(const Run& run, const RawRun& raw, RecordingsByPath& taken) {
+  const fs::path asked(run.raw);
+  fs::path path = asked;
+  const auto is_taken = [&] {
+    fs::path key = path.lexically_normal().replace_extension();  // the gaps' file is named without it
+    return taken.emplace(std::move(key), raw.hash).first->second != raw.hash;
+  };
+  for (int i = 2; is_taken(); ++i)
+    path.replace_filename(fmt::format("{}-{}{}", asked.stem().string(), i, asked.extension().string()));
+  return path.string();
+}
+
 void write_folder(const CampaignFile& file, const fs::path& folder, const Progress& progress) {
   write_text(folder / "campaign.toml", file.info().toml);
   const Sheet no_points{.file = "", .columns = {"cell", "applied_force_N", "voltage_V"}, .rows = {}};
   write_text(folder / "calibration.csv", format_csv(file.sheet("calibration").value_or(no_points)));
-  for (const char* name : {"runs", "propellers"}) {
-    if (const auto sheet = file.sheet(name))
-      write_text(folder / fmt::format("{}.csv", name), format_csv(*sheet));
-  }
+  if (const auto sheet = file.sheet("propellers")) write_text(folder / "propellers.csv", format_csv(*sheet));
+  auto sheet = file.sheet("runs");
   const std::vector<Run> runs = file.runs();
+  RecordingsByPath taken;
   std::size_t done = 0;
   for (const Run& run : runs) {
-    if (const auto raw = raw_run(file, run.run)) export_raw_run(file, *raw, folder / run.raw);
+    if (const auto raw = raw_run(file, run.run)) {
+      const std::string path = path_of(run, *raw, taken);
+      sheet->rows[run.row].cells[sheet->require("raw")] = path;
+      export_raw_run(file, *raw, folder / path);
+    }
     if (progress) progress(++done, runs.size());
   }
+  if (sheet) write_text(folder / "runs.csv", format_csv(*sheet));
 }
 
 }  // namespace

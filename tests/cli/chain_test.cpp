@@ -1,20 +1,26 @@
 // From bytes to a map with the program itself: its demo, with shorter runs.
 #include "analysis/maps/disturbance_map.h"
 #include "cli/program.h"
+#include "datasets/campaign_file.h"
 #include "datasets/csv.h"
 #include "datasets/locations.h"
+#include "support/example_campaign.h"
 #include "support/field_claims.h"
 #include "support/temporary_folder.h"
 
+#include <fstream>
+#include <future>
 #include <map>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 
 namespace tunnelrig {
 namespace {
 
+namespace fs = std::filesystem;
 using test::ProgramResult;
 using testing::HasSubstr;
 
@@ -127,6 +133,26 @@ TEST_F(Chain, PlanResumesWhereItStopped) {
   EXPECT_EQ(read_text(folder / "one/runs.csv"), read_text(folder / "other/runs.csv"))
       << "the virtual rig does not depend on the break";
   EXPECT_THAT(run("log --db c.db --plan plan.csv --speed max").out, HasSubstr("0 of "));
+}
+
+/// An import brings names of its own, and raw files of its own.
+TEST_F(Chain, ALoggedRunHasANameThatNoImportedOneHas) {
+  test::ExampleCampaign campaign;
+  campaign.runs_csv =
+      "run,location,repeat,session,start_utc,raw,thrust_1_N,thrust_2_N,thrust_3_N,thrust_4_N,air_temperature_"
+      "C\n"
+      "R0003,OT,1,S1,2026-03-02T08:00:00Z,,7.1,7.2,7.3,7.4,20\n"
+      "mine,OT,2,S1,2026-03-02T08:05:00Z,raw/R0004.npy,,,,,20\n";
+  campaign.write(folder / "source");
+  fs::rename(folder / "source/raw/R1.npy", folder / "source/raw/R0004.npy");
+  expect_well("import source --db c.db");
+  expect_well("log --db c.db --location OT --repeat 3 --session S1 --duration 1 --speed max");
+  expect_well("log --db c.db --location OT --repeat 4 --session S1 --duration 1 --speed max");
+  const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+  const auto runs = file.runs();
+  ASSERT_EQ(runs.size(), 4u);
+  EXPECT_EQ(runs[2].run, "R0005");
+  EXPECT_EQ(runs[3].run, "R0006");
 }
 
 TEST_F(Chain, LossesAreSaidAndExitWithOne) {

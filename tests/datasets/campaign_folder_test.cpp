@@ -225,6 +225,25 @@ TEST_F(Folder, ExportNeverOverwrites) {
   EXPECT_NO_THROW(export_campaign_folder(file, folder / "empty", {}));
 }
 
+/// Files of before had such rows: a logged run R0002 beside an imported one whose raw file is raw/R0002.npy.
+TEST_F(Folder, ExportKeepsTwoRecordingsOfOnePathApart) {
+  campaign.write(source);
+  import_campaign_folder(source, db, options());
+  {
+    CampaignFile file(db, CampaignFile::Access::kWrite);
+    file.set_cell("runs", "run", "R3", "raw", "raw/R1.npy");
+  }
+  const CampaignFile file(db, CampaignFile::Access::kRead);
+  export_campaign_folder(file, folder / "out", {});
+  fs::remove(db);
+  import_campaign_folder(folder / "out", db, options());
+  const CampaignFile again(db, CampaignFile::Access::kRead);
+  for (const char* run : {"R1", "R2", "R3"})
+    EXPECT_EQ(raw_run(again, run)->hash, raw_run(file, run)->hash) << run;
+  EXPECT_EQ(again.runs()[0].raw, "raw/R1.npy");
+  EXPECT_EQ(again.runs()[2].raw, "raw/R1-2.npy");
+}
+
 TEST(SharedExample, RoundTrip) {
   SKIP_WITHOUT_SHARED_DATA();
   const test::TemporaryFolder folder;
