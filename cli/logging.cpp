@@ -48,6 +48,10 @@ std::string free_name(const CampaignFile& file) {
 /// What no run sheet could hold would make every run of the file unreadable: it is refused before there is
 /// one.
 const LogOptions& checked(const LogOptions& options) {
+  for (const auto& [option, text] : {std::pair("--session", &options.session),
+                                     {"--location", &options.location},
+                                     {"--source", &options.source}})
+    if (!is_utf8(*text)) throw InputError(fmt::format("{}: this is not UTF-8 text", option));
   if (options.repeat < 0) throw InputError(fmt::format("--repeat: {} is below 0", options.repeat));
   for (const auto& [column, option, value] : kConditionOptions)
     if (const auto given = options.*value)

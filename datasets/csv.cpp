@@ -76,8 +76,7 @@ class Scanner {
   int line_ = 1;
 };
 
-/// The length of the UTF-8 sequence at the start of `text`; 0 where it is none (RFC 3629, without the
-/// overlong forms' fine print: what matters is that the text can be stored and shown).
+/// The length of the UTF-8 sequence at the start of `text`; 0 where it is none (RFC 3629, section 4).
 std::size_t utf8_length(std::string_view text) {
   const auto first = static_cast<unsigned char>(text[0]);
   const std::size_t length = first < 0x80                    ? 1
@@ -86,8 +85,14 @@ std::size_t utf8_length(std::string_view text) {
                              : first >= 0xF0 && first < 0xF5 ? 4
                                                              : 0;
   if (length == 0 || text.size() < length) return 0;
+  // Of the second byte: no overlong form, no half of a UTF-16 pair, nothing above U+10FFFF.
+  unsigned char lowest = first == 0xE0 ? 0xA0 : first == 0xF0 ? 0x90 : 0x80;
+  unsigned char highest = first == 0xED ? 0x9F : first == 0xF4 ? 0x8F : 0xBF;
   for (std::size_t i = 1; i < length; ++i) {
-    if ((static_cast<unsigned char>(text[i]) & 0xC0) != 0x80) return 0;
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if (byte < lowest || byte > highest) return 0;
+    lowest = 0x80;
+    highest = 0xBF;
   }
   return length;
 }
@@ -114,6 +119,15 @@ void check_header(const Sheet& sheet) {
 }
 
 }  // namespace
+
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t length = utf8_length(text);
+    if (length == 0) return false;
+    text.remove_prefix(length);
+  }
+  return true;
+}
 
 std::optional<double> parse_number(std::string_view text) {
   text = trimmed(text);

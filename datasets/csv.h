@@ -69,6 +69,9 @@ std::string csv_cell(std::string_view text);
 std::string format_csv(const Sheet& sheet);
 
 /// Strict decimal number (no blanks inside, point as decimal mark, finite), or nothing.
+/// Whether a text is UTF-8 (RFC 3629): what can be stored, shown and written as JSON.
+bool is_utf8(std::string_view text);
+
 std::optional<double> parse_number(std::string_view text);
 
 /// What to say of a path where nothing could be found: that it may not be looked at, or `otherwise`.

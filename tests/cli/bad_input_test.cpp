@@ -182,6 +182,11 @@ TEST_F(BadInput, ConditionsThatNoSheetCanHold) {
   EXPECT_THAT(refused("--speed-rpm -5"), HasSubstr("--speed-rpm: -5"));
   EXPECT_THAT(refused("--motor-s -3"), HasSubstr("--motor-s: -3"));
   EXPECT_THAT(refused("--repeat -1"), HasSubstr("--repeat: -1"));
+  const std::string surrogate = "\"$(printf '\\355\\240\\200')\"";
+  EXPECT_THAT(refusal_of("log --db c.db --location OT --session " + surrogate, {}),
+              HasSubstr("--session: this is not UTF-8"));
+  EXPECT_THAT(refusal_of("log --db c.db --session S1 --location " + surrogate, {}),
+              HasSubstr("--location: this is not UTF-8"));
 }
 
 TEST_F(BadInput, ALogThatFailsLeavesNoFile) {

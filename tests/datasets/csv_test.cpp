@@ -3,6 +3,8 @@
 #include "support/message_of.h"
 #include "support/temporary_folder.h"
 
+#include <fstream>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -50,6 +52,20 @@ TEST(Csv, NamesFileLineAndColumnOfWhatIsWrong) {
               HasSubstr("t.csv:2: column a: 'x' is not a finite"));
   EXPECT_THAT(message_of([&] { (void)sheet.require("b"); }),
               HasSubstr("t.csv:1: the required column b is missing"));
+}
+
+/// RFC 3629, section 4: what passes here is written as JSON later, and its writer is strict.
+TEST(Csv, TextIsUtf8ToTheLetter) {
+  for (const char* text : {"", "a", "\xC2\x80", "\xE0\xA0\x80", "\xED\x9F\xBF", "\xEE\x80\x80",
+                           "\xF0\x90\x80\x80", "\xF4\x8F\xBF\xBF"})
+    EXPECT_TRUE(is_utf8(text)) << text;
+  for (const char* text :
+       {"\xFF", "\x80", "\xC0\x80", "\xC1\xBF", "\xC3", "\xE0\x9F\xBF", "\xED\xA0\x80", "\xED\xBF\xBF",
+        "\xE1\x80", "\xF0\x8F\xBF\xBF", "\xF4\x90\x80\x80", "\xF5\x80\x80\x80", "\xF1\x80\x80\xC0"}) {
+    EXPECT_FALSE(is_utf8(text)) << text;
+    EXPECT_THAT(message_of([&] { parse_csv(fmt::format("a\n{}\n", text), "t.csv"); }),
+                HasSubstr("t.csv:2: this is not UTF-8"));
+  }
 }
 
 TEST(Csv, NumbersAreStrict) {
