@@ -124,14 +124,16 @@ class Examination {
       const auto ledger = ledger_of(file_, run.id);
       std::uint64_t in_gaps = 0;
       for (const Gap& gap : gaps_of(file_, run.id)) in_gaps += gap.frames_lost;
-      if (!ledger) continue;  // imported: its gaps are all that is known
-      if (!ledger->closed() || ledger->frames_stored != run.frames || ledger->frames_lost != in_gaps)
+      if (ledger &&
+          (!ledger->closed() || ledger->frames_stored != run.frames || ledger->frames_lost != in_gaps))
         open.add(name);
-      lost += ledger->frames_lost;
-      emitted += ledger->frames_emitted;
-      if (ledger->frames_lost > 0) lossy.add(name);
-      if (static_cast<double>(ledger->frames_lost) > kMuchLost * static_cast<double>(ledger->frames_emitted))
-        much.add(name);
+      // Of an imported run the gaps are all that is known.
+      const std::uint64_t run_lost = ledger ? ledger->frames_lost : in_gaps;
+      const std::uint64_t run_emitted = ledger ? ledger->frames_emitted : run.frames + in_gaps;
+      lost += run_lost;
+      emitted += run_emitted;
+      if (run_lost > 0) lossy.add(name);
+      if (static_cast<double>(run_lost) > kMuchLost * static_cast<double>(run_emitted)) much.add(name);
     }
     if (!open.empty())
       problem("loss ledger", "emitted is not stored plus lost in " + open.text(),

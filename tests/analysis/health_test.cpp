@@ -111,6 +111,17 @@ TEST_F(Health, AnOldCertificateAndAnOpenLedger) {
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("loss ledger: emitted is not stored plus lost in R1"));
 }
 
+/// An imported run has no ledger, but its gaps.
+TEST_F(Health, TheGapsOfAnImportAreLosses) {
+  campaign.write(folder / "source");
+  write_text(folder / "source/raw/R1.gaps.csv", "first_frame,frames_lost,cause,estimated\n100,3,lost,0\n");
+  read();
+  calibrate_file();
+  EXPECT_THAT(found(Severity::kNote), HasSubstr("losses: 3 of "));
+  EXPECT_THAT(found(Severity::kNote), HasSubstr("in R1"));
+  EXPECT_THAT(found(Severity::kGood), testing::Not(HasSubstr("nothing lost")));
+}
+
 TEST_F(Health, OneRecordingOfTwoRuns) {
   const auto at = campaign.runs_csv.find("raw/R2.npy");
   ASSERT_NE(at, std::string::npos);
