@@ -194,6 +194,21 @@ Run parse_run(const Sheet& sheet, std::size_t row, const Columns& columns, const
   return run;
 }
 
+/// "", "Z", "+05:30", "-0530", "+05" in minutes east; nothing for any other text.
+std::optional<int> parse_zone(std::string_view text) {
+  if (text.empty() || text == "Z" || text == "z") return 0;
+  std::string digits(text.substr(1));
+  if (digits.size() == 5 && digits[2] == ':') digits.erase(2, 1);
+  const bool are_digits =
+      std::all_of(digits.begin(), digits.end(), [](char c) { return c >= '0' && c <= '9'; });
+  if ((text[0] != '+' && text[0] != '-') || (digits.size() != 2 && digits.size() != 4) || !are_digits)
+    return {};
+  digits.resize(4, '0');
+  const int hour = std::stoi(digits.substr(0, 2)), minute = std::stoi(digits.substr(2));
+  if (hour > 14 || minute > 59) return {};
+  return (text[0] == '-' ? -1 : 1) * (60 * hour + minute);
+}
+
 void check_source(const Sheet& sheet, const Run& run, const CampaignInfo& campaign) {
   if (!run.raw.empty()) return;
   for (int rotor = 1; rotor <= campaign.rig.rotors; ++rotor) {
@@ -301,7 +316,7 @@ std::optional<double> parse_utc(std::string_view text) {
   if (std::sscanf(copy.c_str(), "%4d-%2d-%2d%*1[T ]%2d:%2d%n", &year, &month, &day, &hour, &minute, &used) !=
           5 ||
       used == 0 || month < 1 || month > 12 || day < 1 || day > 31 || hour < 0 || hour > 24 || minute < 0 ||
-      minute > 59) {
+      minute > (hour == 24 ? 0 : 59)) {
     return {};
   }
   std::string_view rest = std::string_view(copy).substr(static_cast<std::size_t>(used));
@@ -309,21 +324,12 @@ std::optional<double> parse_utc(std::string_view text) {
   if (rest.starts_with(':')) {
     const auto end = std::min(rest.find_first_not_of("0123456789.", 1), rest.size());
     const auto parsed = parse_number(rest.substr(1, end - 1));
-    if (!parsed || *parsed < 0 || *parsed >= 61) return {};
+    if (!parsed || *parsed < 0 || *parsed >= 61 || (hour == 24 && *parsed > 0)) return {};
     second = *parsed;
     rest.remove_prefix(end);
   }
-  int zone_minutes = 0;
-  if (rest.starts_with('+') || rest.starts_with('-')) {
-    int zone_hour = 0, zone_minute = 0;
-    const std::string zone(rest.substr(1));
-    const int fields = std::sscanf(zone.c_str(), zone.find(':') == std::string::npos ? "%2d%2d" : "%2d:%2d",
-                                   &zone_hour, &zone_minute);
-    if (fields < 1 || zone_hour > 14 || zone_minute > 59) return {};
-    zone_minutes = (rest[0] == '-' ? -1 : 1) * (60 * zone_hour + zone_minute);
-  } else if (!rest.empty() && rest != "Z" && rest != "z") {
-    return {};
-  }
+  const std::optional<int> zone_minutes = parse_zone(rest);
+  if (!zone_minutes) return {};
   std::tm calendar{};
   calendar.tm_year = year - 1900;
   calendar.tm_mon = month - 1;
@@ -332,7 +338,7 @@ std::optional<double> parse_utc(std::string_view text) {
   calendar.tm_min = minute;
   const std::time_t seconds = ::timegm(&calendar);  // counts on: the 30th of February is the 2nd of March
   if (hour < 24 && (calendar.tm_mon != month - 1 || calendar.tm_mday != day)) return {};
-  return static_cast<double>(seconds) + second - 60.0 * zone_minutes;
+  return static_cast<double>(seconds) + second - 60.0 * *zone_minutes;
 }
 
 std::string format_utc(double seconds) {
