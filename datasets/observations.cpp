@@ -56,7 +56,11 @@ Observation read_row(const Sheet& sheet, std::size_t row, const TableSchema& sch
   }
   observation.diameter_m = schema.diameter_m;
   if (schema.diameter_column) {
-    observation.diameter_m = sheet.require_number(row, *schema.diameter_column) * schema.diameter_unit_m;
+    const double diameter = sheet.require_number(row, *schema.diameter_column);
+    if (!(diameter > 0))
+      throw InputError(fmt::format("{}: {:g} is no diameter of a propeller; it is above 0",
+                                   sheet.where(row, *schema.diameter_column), diameter));
+    observation.diameter_m = diameter * schema.diameter_unit_m;
   }
   for (const TableColumn& column : schema.covariates) {
     if (column.unit == kTextUnit) continue;

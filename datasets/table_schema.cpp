@@ -64,6 +64,15 @@ class Reader {
     return column;
   }
 
+  const Unit& unit(std::string_view key) const {
+    const std::string name = required_string(key);
+    try {
+      return unit_from_name(name);
+    } catch (const InputError& error) {
+      throw InputError::at(file_, line_of(key), "{}{}: {}", name_, key, error.what());
+    }
+  }
+
   void only(std::initializer_list<std::string_view> keys) const {
     require_known_keys(table_, name_.empty() ? "the file" : name_.substr(0, name_.size() - 1), file_, keys);
   }
@@ -168,11 +177,10 @@ void read_propeller(const Reader& top, TableSchema& schema) {
   if (schema.diameter_m)
     throw InputError::at(file, Reader::line(*table),
                          "propeller.diameter_m and propeller.diameter_column: write one of them");
-  const std::string name = reader.required_string("diameter_unit");
-  const Unit& unit = unit_from_name(name);
+  const Unit& unit = reader.unit("diameter_unit");
   if (unit.quantity != "length") {
-    throw InputError::at(file, Reader::line(*table), "propeller.diameter_unit is '{}', a unit of {}", name,
-                         unit.quantity);
+    throw InputError::at(file, Reader::line(*table), "propeller.diameter_unit is '{}', a unit of {}",
+                         unit.name, unit.quantity);
   }
   schema.diameter_unit_m = unit.factor;
 }

@@ -73,6 +73,12 @@ TEST(Observations, NamesWhatIsWrong) {
   EXPECT_THAT(refusal(kSchema, "pole_count = 14\n", "pole_count = 7\n"), HasSubstr("even number"));
   EXPECT_THAT(refusal(kSchema, "diameter_column = \"D\"\n", "diameter_column = \"D\"\ndiameter_m = 0.2\n"),
               HasSubstr("write one of them"));
+  EXPECT_THAT(refusal(kSchema, "diameter_unit = \"in\"", "diameter_unit = \"inch\""),
+              HasSubstr("s.toml:20: propeller.diameter_unit: 'inch' is not a known unit"));
+  for (const char* diameter : {"-10", "0"})
+    EXPECT_THAT(refusal(kSchema, "name", "name",
+                        fmt::format("prop,motor,T,N,D,Tair\nA,m,1,35000,{},293\n", diameter)),
+                HasSubstr("is no diameter of a propeller"));
   EXPECT_THAT(refusal(kSchema, "bins(N, 4)", "bins(N)"), HasSubstr("blocks = \"bins(N)\""));
   EXPECT_THAT(refusal(kSchema, "bins(N, 4)", "day"), HasSubstr("the required column day is missing"));
   EXPECT_THAT(refusal(kSchema, "\"air_temperature_C\"", "\"warmth\""),
