@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -17,9 +18,9 @@ constexpr std::array<double, 7> kRows = {-0.95, -0.64, -0.32, 0, 0.32, 0.64, 0.9
 constexpr std::array<double, 10> kGround_R = {0.75, 1, 1.25, 1.5, 1.75, 2, 3, 4, 5, 6};
 constexpr std::array<double, 9> kCeiling_R = {0.75, 1, 1.25, 1.5, 1.75, 2, 3, 4, 5};
 
-std::optional<int> small_integer(std::string_view text) {
+std::optional<int> integer(std::string_view text, int lowest, int highest) {
   const auto value = parse_number(text);
-  if (!value || *value != static_cast<int>(*value)) return {};
+  if (!value || *value < lowest || *value > highest || *value != std::floor(*value)) return {};
   return static_cast<int>(*value);
 }
 
@@ -29,9 +30,9 @@ std::optional<TunnelPoint> grid_point(std::string_view label) {
   if (label == "OT") return TunnelPoint{};
   const auto v = label.find('V');
   if (!label.starts_with('H') || v == std::string_view::npos) return {};
-  const auto column = small_integer(label.substr(1, v - 1));
-  const auto row = small_integer(label.substr(v + 1));
-  if (!column || !row || *column < 0 || *column > 5 || *row < -3 || *row > 3) return {};
+  const auto column = integer(label.substr(1, v - 1), 0, 5);
+  const auto row = integer(label.substr(v + 1), -3, 3);
+  if (!column || !row) return {};
   return TunnelPoint{kColumns[static_cast<std::size_t>(*column)], kRows[static_cast<unsigned>(*row + 3)]};
 }
 

@@ -143,7 +143,7 @@ TEST(Locations, LabelsOfTheThesis) {
   EXPECT_EQ(grid_point("OT")->z_norm, 0);
   EXPECT_EQ(canonical_location("H0V0"), "OT");
   EXPECT_EQ(distance_of("GND1.25", "GND"), 1.25);
-  for (const char* label : {"H6V0", "H0V4", "HV", "OS", "H1", "H1V1.5"})
+  for (const char* label : {"H6V0", "H0V4", "HV", "OS", "H1", "H1V1.5", "H1e300V0", "H0V-1e300"})
     EXPECT_FALSE(grid_point(label)) << label;
 }
 
