@@ -11,6 +11,8 @@ namespace {
 
 constexpr std::array<std::string_view, 3> kStates = {"recording", "complete", "partial"};
 
+constexpr std::string_view kInterrupted = "the recorder ended before the run did";
+
 std::int64_t chunk_key(std::int64_t raw_run, std::uint64_t first_frame) {
   return (raw_run << 32) | static_cast<std::int64_t>(first_frame);
 }
@@ -277,6 +279,10 @@ std::vector<std::string> close_interrupted_runs(CampaignFile& file) {
     if (run.state != RunState::kRecording) continue;
     HashSink sink(run.format);
     read_raw(file, run, sink);
+    Statement(file.database(), "UPDATE ledgers SET end_reason = ? WHERE raw_run = ?")
+        .bind(kInterrupted)
+        .bind(run.id)
+        .run();
     write_state(file.database(), run.id, RunState::kPartial, run.frames, sink.finish());
     names.push_back(run.run);
   }

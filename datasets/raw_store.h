@@ -100,8 +100,9 @@ std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run);
 /// missing.
 void read_raw(const CampaignFile& file, const RawRun& run, FrameSink& sink);
 
-/// Runs left in state "recording" belong to a recorder that was killed: marks them partial, with their hash.
-/// The file must be open for recording, so that nobody can still be writing them. Returns their names.
+/// Runs left in state "recording" belong to a recorder that was killed: marks them partial, with their hash
+/// and, in the ledger, the reason. The file must be open for recording, so that nobody can still be writing
+/// them. Returns their names.
 std::vector<std::string> close_interrupted_runs(CampaignFile& file);
 
 }  // namespace tunnelrig

@@ -128,6 +128,7 @@ TEST_F(RawStore, InterruptedRunsBecomePartial) {
   EXPECT_EQ(run.state, RunState::kPartial);
   EXPECT_EQ(run.frames, 500u);
   EXPECT_THAT(run.hash, HasSubstr("xxh3:"));
+  EXPECT_EQ(ledger_of(file, run.id)->end_reason, "the recorder ended before the run did");
   EXPECT_TRUE(close_interrupted_runs(file).empty());
 }
 
