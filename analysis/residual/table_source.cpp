@@ -98,8 +98,8 @@ void leave_out(TableSource& source, const char* why, Observations& result, const
     return goes;
   });
   if (out.empty()) return;
-  result.left_out.push_back(fmt::format("{} {}: {}, {}", out.size(), out.size() == 1 ? "row" : "rows", why,
-                                        first_few(out, kNamedRows)));
+  result.left_out.push_back(fmt::format("{} {} left out: {}, {}", out.size(),
+                                        out.size() == 1 ? "row" : "rows", why, first_few(out, kNamedRows)));
 }
 
 /// A speed that a few rows lack would be no condition at all.

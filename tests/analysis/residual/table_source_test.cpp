@@ -65,10 +65,11 @@ TEST_F(TableSourceTest, RowsWithoutASpeedHaveNoC_TAndAreSaid) {
   const Observations o = observed(csv, schema + kPropeller);
   EXPECT_EQ(o.rows(), 96);
   EXPECT_TRUE(o.multiplicative);
-  EXPECT_THAT(o.left_out, ElementsAre("1 row: the motor stood or its speed was not read (at most 5 % of what "
-                                      "its group runs at), t.csv:108",
-                                      "10 rows: no speed was read, so there is no C_T, t.csv:98, t.csv:99, "
-                                      "t.csv:100, t.csv:101 and 6 more"));
+  EXPECT_THAT(o.left_out,
+              ElementsAre("1 row left out: the motor stood or its speed was not read (at most 5 % of what "
+                          "its group runs at), t.csv:108",
+                          "10 rows left out: no speed was read, so there is no C_T, t.csv:98, t.csv:99, "
+                          "t.csv:100, t.csv:101 and 6 more"));
   EXPECT_EQ(observed(csv, schema).rows(), 105)
       << "a day without speeds has its thrusts; one empty cell is left out";
 }
@@ -120,7 +121,7 @@ TEST_F(TableSourceTest, AFewRowsWithoutASpeedAreLeftOut) {
   for (int row = 0; row < 3; ++row) csv += fmt::format("1,,{}\n", 5 + row);
   const Observations o = observed(csv, kThrustAndSpeed);
   EXPECT_EQ(o.rows(), 96);
-  EXPECT_THAT(o.left_out, ElementsAre(HasSubstr("3 rows: no speed was read, as in all others")));
+  EXPECT_THAT(o.left_out, ElementsAre(HasSubstr("3 rows left out: no speed was read, as in all others")));
   EXPECT_FALSE(o.not_usable.contains("speed_rpm"));
 }
 
@@ -178,7 +179,7 @@ TEST_F(TableSourceTest, RowsWithoutAirHaveNoC_TAndItsPressureIsNotSoughtAgain) {
   const Observations o = observed(csv, schema);
   EXPECT_EQ(o.rows(), 95);
   EXPECT_THAT(o.left_out,
-              ElementsAre(HasSubstr("1 row: the temperature or the pressure of the air is empty")));
+              ElementsAre(HasSubstr("1 row left out: the temperature or the pressure of the air is empty")));
   EXPECT_THAT(testability(effect_named("air_pressure"), o).reason, HasSubstr("density"));
   EXPECT_EQ(explained(o).verdict, "no_structure");
   EXPECT_EQ(observed(csv, schema, "constant").rows(), 95)
