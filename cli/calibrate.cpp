@@ -26,13 +26,10 @@ RobustLoss loss_of(const std::string& name) {
   return RobustLoss::kOrdinary;
 }
 
-/// Puts a laboratory's own file of points or tests into the campaign, once it is known to be good.
-template <typename Parse>
-void take_sheet(CampaignFile& file, const std::string& path, const char* name, Parse parse) {
-  if (path.empty()) return;
-  const Sheet sheet = read_csv(path);
-  parse(sheet);
-  file.set_sheet(name, sheet);
+/// A laboratory's own file of points or tests.
+std::optional<Sheet> read_if_given(const std::string& path) {
+  if (path.empty()) return {};
+  return read_csv(path);
 }
 
 int calibrate_campaign(const CalibrateOptions& options) {
@@ -42,18 +39,18 @@ int calibrate_campaign(const CalibrateOptions& options) {
   how.cell.loss = loss_of(options.loss);
   how.cell.gauge_force_N = info.uncertainty.force_N.value_or(0);
   how.cell.leave_out_gross = !options.keep_gross;
-  Certificate certificate;
+  const auto new_points = read_if_given(options.points), new_tests = read_if_given(options.propellers);
+  const auto points =
+      new_points ? parse_calibration(*new_points, info.rig.rotors) : file.calibration_points();
+  const auto tests = new_tests ? parse_propellers(*new_tests, info.rig.rotors) : file.propeller_tests();
+  if (points.empty())
+    throw InputError::in(options.db, "holds no calibration points; --points calibration.csv adds them");
+  const Certificate certificate = calibrate(points, tests, how);
+  const nlohmann::json inputs{{"points", certificate.points_hash}};
   std::int64_t id = 0;
-  file.atomically([&] {
-    take_sheet(file, options.points, "calibration",
-               [&](const Sheet& sheet) { parse_calibration(sheet, info.rig.rotors); });
-    take_sheet(file, options.propellers, "propellers",
-               [&](const Sheet& sheet) { parse_propellers(sheet, info.rig.rotors); });
-    const auto points = file.calibration_points();
-    if (points.empty())
-      throw InputError::in(options.db, "holds no calibration points; --points calibration.csv adds them");
-    certificate = calibrate(points, file.propeller_tests(), how);
-    const nlohmann::json inputs{{"points", certificate.points_hash}};
+  file.atomically([&] {  // only what is to be written: a recorder may be waiting
+    if (new_points) file.set_sheet("calibration", *new_points);
+    if (new_tests) file.set_sheet("propellers", *new_tests);
     id = file.add_document("calibration", {program_version(), arguments(), inputs.dump()},
                            to_json(certificate));
   });

@@ -209,7 +209,10 @@ void Logging::show(ProgressBar& bar, const LogProgress& progress) const {
     volts[c] = progress.mean_counts[c] * info_.daq.volts_per_count();
   bar.show(progress.elapsed_s, progress.duration_s,
            fmt::format("{} frames, {} lost, {}{}", progress.ledger->frames_stored,
-                       progress.ledger->frames_lost, means_text(volts), progress.silent ? ", SILENT" : ""));
+                       progress.ledger->frames_lost, means_text(volts),
+                       progress.held_up  ? ", ANOTHER PROGRAM HOLDS THE FILE"
+                       : progress.silent ? ", SILENT"
+                                         : ""));
 }
 
 int Logging::report(const std::string& name, const PlannedRun& planned, const LogOutcome& outcome) const {

@@ -24,6 +24,7 @@ constexpr std::chrono::milliseconds kReadTimeout{50};
 constexpr std::chrono::milliseconds kReopenPause{250};
 constexpr std::chrono::milliseconds kTick{20};
 constexpr std::chrono::milliseconds kProgressInterval{200};
+constexpr std::chrono::milliseconds kHeldUp{1000};
 constexpr double kChunk_s = 0.1;
 
 /// Reads on its own thread until the source ends or the queue closes, so that neither a slow disk nor a slow
@@ -164,7 +165,9 @@ class Recording {
             RunSummarizer& summarizer, const PacketSource& source)
       : settings_(settings),
         rate_hz_(info.daq.sample_rate_hz),
-        tracker_(static_cast<std::uint64_t>(std::llround(settings.duration_s * rate_hz_))),
+        // A tracker of no frames would never be complete.
+        tracker_(static_cast<std::uint64_t>(std::max(1LL, std::llround(settings.duration_s * rate_hz_)))),
+        file_(file),
         writer_(file, run, RawFormat{}, static_cast<std::size_t>(kChunk_s * rate_hz_)),
         sink_(writer_, summarizer, settings.watcher),
         packets_(tracker_, sink_),
@@ -176,7 +179,6 @@ class Recording {
                      const std::function<void(const LogProgress&)>& progress, const std::atomic<bool>& stop) {
     std::ofstream capture;
     if (!settings_.capture.empty()) capture.open(settings_.capture, std::ios::binary);
-    auto next_progress = Clock::now();
     while (!tracker_.complete()) {
       if (stop) return "stopped by the user";
       const bool was_silent = watchdog_.silent();
@@ -188,12 +190,16 @@ class Recording {
         if (!end.empty()) return end;
       }
       commit_when_due();
-      if (Clock::now() >= next_progress || watchdog_.silent() != was_silent) {
-        next_progress = Clock::now() + kProgressInterval;
-        report(progress);
-      }
+      if (watchdog_.silent() != was_silent) next_progress_ = {};
+      report_when_due(progress);
     }
     return "";
+  }
+
+  void report_when_due(const std::function<void(const LogProgress&)>& progress) {
+    if (Clock::now() < next_progress_) return;
+    next_progress_ = Clock::now() + kProgressInterval;
+    report(progress);
   }
 
   LogOutcome finish(RunSummarizer& summarizer, const std::string& end_reason) {
@@ -209,6 +215,7 @@ class Recording {
       outcome.ledger.drift_interval_ppm_h = outcome.clock->drift_interval_ppm_h;
     }
     const std::string hash = writer_.finish(outcome.state, outcome.ledger);
+    oldest_pending_ = Clock::time_point::max();
     outcome.statistics = summarizer.finish(hash);
     return outcome;
   }
@@ -221,6 +228,7 @@ class Recording {
     progress({.elapsed_s = static_cast<double>(now.frames_emitted) / rate_hz_,
               .duration_s = settings_.duration_s,
               .silent = watchdog_.silent(),
+              .held_up = Clock::now() - oldest_pending_ > kHeldUp,
               .mean_counts = sink_.means(),
               .ledger = &now,
               .clock = packets_.clock().estimate(),
@@ -270,14 +278,15 @@ class Recording {
     const auto now = Clock::now();
     oldest_pending_ = std::min(oldest_pending_, now);
     if (now - oldest_pending_ < settings_.commit_interval) return;
-    writer_.commit(ledger());
-    oldest_pending_ = Clock::time_point::max();
+    if (file_.atomically_if_free([&] { writer_.commit(ledger()); }))
+      oldest_pending_ = Clock::time_point::max();
   }
 
   const LogSettings& settings_;
   double rate_hz_;
   PacketDecoder decoder_;
   LossTracker tracker_;
+  CampaignFile& file_;
   RawWriter writer_;
   RunSink sink_;
   TrackerSink packets_;
@@ -286,6 +295,7 @@ class Recording {
   std::uint64_t silences_ = 0;
   std::string end_reason_;
   Clock::time_point oldest_pending_ = Clock::time_point::max();
+  Clock::time_point next_progress_{};
 };
 
 std::string name_of_run(const RunCells& cells) {
@@ -314,10 +324,14 @@ LogOutcome log_run(PacketSource& source, CampaignFile& file, const RunCells& run
     end_reason = recording->record(queue, reader, progress, stop);
   }
   LogOutcome outcome;
-  file.atomically([&] {
+  const auto finish = [&] {
     outcome = recording->finish(*summarizer, end_reason);
     if (outcome.statistics.frames > 0) store_statistics(file, recording->id(), outcome.statistics);
-  });
+  };
+  while (!file.atomically_if_free(finish)) {
+    recording->report_when_due(progress);
+    std::this_thread::sleep_for(kTick);
+  }
   recording->report(progress);
   return outcome;
 }

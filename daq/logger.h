@@ -41,6 +41,7 @@ struct LogProgress {
   double duration_s = 0;
   bool silent = false;
   std::array<double, 4> mean_counts{};  // of the frames so far
+  bool held_up = false;  // another program has been writing to the file for a while: the frames wait here
   const Ledger* ledger = nullptr;
   std::optional<ClockEstimate> clock;        // so far, of a source with a clock
   std::optional<std::uint64_t> ring_frames;  // the most that ever waited on the board, where it says so
@@ -60,8 +61,9 @@ using RunCells = std::vector<std::pair<std::string, std::string>>;
 /// durable within settings.commit_interval; statistics and state at the end. `progress` is called several
 /// times a second, `stop` ends the run early (state partial).
 ///
-/// Throws InputError where the run exists, StorageError where the disk is full or fails: everything committed
-/// before stays.
+/// While another program writes to the file, frames wait in memory (38 MB an hour), and so does the end of
+/// the run. Throws InputError where the run exists, StorageError where the disk is full or fails: everything
+/// committed before stays.
 LogOutcome log_run(PacketSource& source, CampaignFile& file, const RunCells& run, const LogSettings& settings,
                    const SummarizerFactory& summarizer,
                    const std::function<void(const LogProgress&)>& progress, const std::atomic<bool>& stop);

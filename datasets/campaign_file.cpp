@@ -200,6 +200,14 @@ void CampaignFile::atomically(const std::function<void()>& work) {
   transaction.commit();
 }
 
+bool CampaignFile::atomically_if_free(const std::function<void()>& work) {
+  Transaction transaction(*database_, Transaction::Wait::kNot);
+  if (!transaction.open()) return false;
+  work();
+  transaction.commit();
+  return true;
+}
+
 std::optional<std::string> CampaignFile::text(std::string_view name) const {
   Statement select(*database_, "SELECT text FROM texts WHERE name = ?");
   select.bind(name);

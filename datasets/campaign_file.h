@@ -59,6 +59,9 @@ class CampaignFile {
   /// Runs `work` in one transaction: all that it writes is stored, or nothing where it throws.
   void atomically(const std::function<void()>& work);
 
+  /// As `atomically`; false at once, and nothing done, where another connection is writing to the file.
+  bool atomically_if_free(const std::function<void()>& work);
+
   // --- what arrived as files -----------------------------------------------------------------------------
 
   std::optional<std::string> text(std::string_view name) const;  // "campaign.toml", "table.toml"

@@ -9,6 +9,8 @@
 namespace tunnelrig {
 namespace {
 
+constexpr int kPatience_ms = 5000;  // with other connections that write
+
 [[noreturn]] void fail(sqlite3* handle, int code) {
   const int extended = handle != nullptr ? sqlite3_extended_errcode(handle) : code;
   const char* file = handle != nullptr ? sqlite3_db_filename(handle, "main") : nullptr;
@@ -28,7 +30,7 @@ Database::Database(const std::string& path, int flags) {
     throw StorageError(fmt::format("{}: {}", path, reason), false);
   }
   sqlite3_extended_result_codes(handle_, 1);
-  sqlite3_busy_timeout(handle_, 5000);
+  sqlite3_busy_timeout(handle_, kPatience_ms);
 }
 
 Database::~Database() {
@@ -150,8 +152,13 @@ std::span<const std::byte> Statement::blob(int column) const {
   return {data, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column))};
 }
 
-Transaction::Transaction(const Database& database) : database_(database) {
-  Statement(database_, "BEGIN IMMEDIATE").run();
+Transaction::Transaction(const Database& database, Wait wait) : database_(database) {
+  sqlite3* handle = database_.handle();
+  if (wait == Wait::kNot) sqlite3_busy_timeout(handle, 0);
+  const int code = sqlite3_exec(handle, "BEGIN IMMEDIATE", nullptr, nullptr, nullptr);
+  if (wait == Wait::kNot) sqlite3_busy_timeout(handle, kPatience_ms);
+  open_ = code == SQLITE_OK;
+  if (!open_ && (wait == Wait::kAsUsual || (code & 0xFF) != SQLITE_BUSY)) fail(handle, code);
 }
 
 Transaction::~Transaction() {

@@ -77,11 +77,15 @@ class Database {
 /// BEGIN IMMEDIATE … COMMIT; rolled back unless committed.
 class Transaction {
  public:
-  explicit Transaction(const Database& database);
+  enum class Wait { kAsUsual, kNot };
+
+  /// Not open where another connection is writing: for long, or at all (kNot). The former throws.
+  explicit Transaction(const Database& database, Wait wait = Wait::kAsUsual);
   ~Transaction();
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
   void commit();
+  bool open() const { return open_; }
 
  private:
   const Database& database_;

@@ -155,6 +155,24 @@ TEST_F(Chain, ALoggedRunHasANameThatNoImportedOneHas) {
   EXPECT_EQ(runs[3].run, "R0006");
 }
 
+/// It reads what it was given before it takes the file's write lock: a recorder would wait for it.
+TEST_F(Chain, ACalibrationThatReadsHoldsNobodyUp) {
+  const test::ExampleCampaign campaign;
+  campaign.write(folder / "source");
+  expect_well("import source --db c.db");
+  ASSERT_EQ(::mkfifo((folder / "points.csv").c_str(), 0600), 0);
+  auto calibrated =
+      std::async(std::launch::async, [&] { return run("calibrate --db c.db --points points.csv"); });
+  std::ofstream points(folder / "points.csv");  // opens once the program reads it
+  {
+    CampaignFile other(folder / "c.db", CampaignFile::Access::kWrite);
+    EXPECT_TRUE(other.atomically_if_free([] {}));
+  }
+  points << campaign.calibration_csv;
+  points.close();
+  EXPECT_EQ(calibrated.get().code, 0);
+}
+
 TEST_F(Chain, LossesAreSaidAndExitWithOne) {
   const ProgramResult lossy = run(
       "log --db c.db --location OT --session S1 --duration 20 --speed max --faults drop=0.02,reboot=5:0.5");

@@ -91,6 +91,41 @@ TEST(Logger, ARunIsNotRecordedTwice) {
   EXPECT_EQ(file.runs().size(), 1u) << "the refused run left a row behind";
 }
 
+TEST(Logger, ARunHasAFrame) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  VirtualBoard board = counting_board(0);
+  const LogOutcome outcome = log_run(board, file, test::cells("R1"), {.duration_s = 0.0003},
+                                     test::summarizer(), {}, test::never_stop());
+  EXPECT_EQ(outcome.state, RunState::kComplete);
+  EXPECT_EQ(outcome.ledger.frames_stored, 1u);
+}
+
+/// SQLite gives up after five seconds. A recorder waits, with the frames, until the other has written.
+TEST(Logger, AnotherProgramThatHoldsTheFileCostsNothing) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  const Database other((folder / "c.db").string(), SQLITE_OPEN_READWRITE);
+  std::optional<Transaction> writing;
+  bool held_up = false;
+  const auto hold_to_beyond_the_end = [&](const LogProgress& progress) {
+    if (held_up) return;
+    if (!writing) writing.emplace(other);
+    held_up = progress.held_up && progress.elapsed_s > progress.duration_s - 0.01;
+    if (held_up) writing.reset();
+  };
+  VirtualBoard board = counting_board(1);
+  const LogOutcome outcome = log_run(board, file, test::cells("R1"), {.duration_s = 1.5}, test::summarizer(),
+                                     hold_to_beyond_the_end, test::never_stop());
+  EXPECT_TRUE(held_up);
+  EXPECT_EQ(outcome.state, RunState::kComplete);
+  EXPECT_EQ(outcome.ledger.frames_lost, 0u);
+  test::FrameList list;
+  read_raw(file, raw_run(file, "R1").value(), list);
+  ASSERT_EQ(list.count(), 2000u);
+  for (std::size_t i = 0; i < list.count(); ++i) ASSERT_EQ(list.samples[4 * i], test::sample_of(i, 0));
+}
+
 /// Counts in shared memory what the sink was given, so that the parent knows what the child had received when
 /// it died.
 TEST(Logger, AKillCostsAtMostTheLastTenthOfASecond) {
