@@ -64,6 +64,7 @@ int run_log(const LogOptions& options) {
     throw InputError("--listen says from where the live page can be reached; it goes with --live");
   std::signal(SIGINT, stop_on_signal);
   std::signal(SIGTERM, stop_on_signal);
+  std::signal(SIGPIPE, SIG_IGN);  // whoever reads --capture by a pipe may end before the recording does
   try {
     if (options.live_port) return run_live(options);
     return options.plan.empty() ? run_one(options) : run_plan(options);
@@ -115,7 +116,7 @@ void add_log(CLI::App& app, Work& work) {
   verb->add_option("--supply-V", options->supply_V, "Supply voltage");
   verb->add_option("--motor-s", options->motor_s, "Seconds since the motors started");
   verb->add_option("--capture", options->capture,
-                   "Write the received bytes to this file too (for --source replay:FILE)");
+                   "Write the received bytes of all runs to this file too (for --source replay:FILE)");
   verb->add_option("--speed", options->pace, "Virtual rig: times real time, or max")->capture_default_str();
   verb->add_option("--seed", options->seed, "Virtual rig: of everything it does")->capture_default_str();
   verb->add_option("--live", options->live_port,

@@ -124,8 +124,10 @@ int Logging::record(const PlannedRun& planned, const std::string& note, const Lo
   cells.insert(cells.end(), conditions_.begin(), conditions_.end());
   cells.emplace_back("source", options_.source);
 
-  const LogSettings settings{
-      .duration_s = planned.duration_s, .capture = options_.capture, .watcher = watch.frames};
+  if (!options_.capture.empty() && !capture_.is_open()) capture_ = open_to_write(options_.capture);
+  const LogSettings settings{.duration_s = planned.duration_s,
+                             .capture = capture_.is_open() ? &capture_ : nullptr,
+                             .watcher = watch.frames};
   const auto measured = std::ranges::find(conditions_, "speed_rpm", &RunCells::value_type::first);
   const auto summarizer = [&](const CampaignInfo& info, const RawFormat& format) {
     return make_run_summarizer(
@@ -147,7 +149,11 @@ int Logging::record(const PlannedRun& planned, const std::string& note, const Lo
     watch.ended(name, outcome);
   else
     mark_alarms(file_, name, alarms(planned, outcome));
-  return report(name, planned, outcome);
+  const int code = report(name, planned, outcome);
+  if (capture_) return code;
+  warn(fmt::format("{}: cannot be written any more, is the disk full? The recording is in {} all the same",
+                   options_.capture, options_.db));
+  return kProblemFound;
 }
 
 /// What a page would have marked the run with, as far as its frames tell.

@@ -11,6 +11,7 @@
 #include <atomic>
 #include <cstdint>
 #include <exception>
+#include <fstream>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -99,6 +100,7 @@ class Logging {
   std::optional<live::CellKnowledge> cells_;  // of the alarms, once a run has ended
   std::optional<VirtualSession> virtual_;
   std::unique_ptr<PacketSource> source_;
+  std::ofstream capture_;  // of all runs, from the first on
   RunCells conditions_;
 };
 

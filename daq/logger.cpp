@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
+#include <ostream>
 #include <thread>
 #include <utility>
 
@@ -177,15 +177,13 @@ class Recording {
   /// Works until the run is complete or ends otherwise; returns the reason, empty where it is complete.
   std::string record(BlockQueue& queue, Reader& reader,
                      const std::function<void(const LogProgress&)>& progress, const std::atomic<bool>& stop) {
-    std::ofstream capture;
-    if (!settings_.capture.empty()) capture.open(settings_.capture, std::ios::binary);
     while (!tracker_.complete()) {
       if (stop) return "stopped by the user";
       const bool was_silent = watchdog_.silent();
       if (const auto block = queue.pop(kTick)) {
-        if (capture.is_open())
-          capture.write(reinterpret_cast<const char*>(block->bytes.data()),
-                        static_cast<std::streamsize>(block->bytes.size()));
+        if (settings_.capture != nullptr)
+          settings_.capture->write(reinterpret_cast<const char*>(block->bytes.data()),
+                                   static_cast<std::streamsize>(block->bytes.size()));
         std::string end = take(*block, reader);
         if (!end.empty()) return end;
       }
@@ -323,6 +321,7 @@ LogOutcome log_run(PacketSource& source, CampaignFile& file, const RunCells& run
     Reader reader(source, queue);
     end_reason = recording->record(queue, reader, progress, stop);
   }
+  if (settings.capture != nullptr) settings.capture->flush();
   LogOutcome outcome;
   const auto finish = [&] {
     outcome = recording->finish(*summarizer, end_reason);

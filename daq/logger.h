@@ -10,8 +10,8 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <filesystem>
 #include <functional>
+#include <iosfwd>
 #include <optional>
 #include <string>
 #include <utility>
@@ -29,8 +29,9 @@ struct LogSettings {
   double silence_s = 1;   // without a new frame for so long, the source counts as silent and is reopened
   double give_up_s = 30;  // and after so long the run ends as partial
 
-  std::filesystem::path
-      capture;  // the bytes as received go here too, for `--source replay:FILE`; empty: nowhere
+  /// The bytes as received go here too, for `--source replay:FILE`; flushed when the run ends. That it cannot
+  /// be written shows in its state, and leaves the recording alone.
+  std::ostream* capture = nullptr;
 
   /// Sees every frame and gap as it is recorded, on the recording thread: it must not wait (daq/live/).
   FrameSink* watcher = nullptr;
@@ -40,8 +41,8 @@ struct LogProgress {
   double elapsed_s = 0;  // of the run, by the board's count of frames
   double duration_s = 0;
   bool silent = false;
-  std::array<double, 4> mean_counts{};  // of the frames so far
   bool held_up = false;  // another program has been writing to the file for a while: the frames wait here
+  std::array<double, 4> mean_counts{};  // of the frames so far
   const Ledger* ledger = nullptr;
   std::optional<ClockEstimate> clock;        // so far, of a source with a clock
   std::optional<std::uint64_t> ring_frames;  // the most that ever waited on the board, where it says so

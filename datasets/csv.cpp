@@ -303,8 +303,14 @@ namespace {
 bool is_data_base(const std::filesystem::path& path) {
   constexpr std::string_view kMagic = "SQLite format 3";
   std::string begins(kMagic.size(), '\0');
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return false;  // a pipe would wait for its writer
   std::ifstream in(path, std::ios::binary);
   return in.read(begins.data(), static_cast<std::streamsize>(begins.size())) && begins == kMagic;
+}
+
+void keep_campaign_files(const std::filesystem::path& path) {
+  if (is_data_base(path)) cannot_write(path, "it is a campaign file; write to another name");
 }
 
 bool put(const std::filesystem::path& path, std::string_view text) {
@@ -316,6 +322,13 @@ bool put(const std::filesystem::path& path, std::string_view text) {
 
 }  // namespace
 
+std::ofstream open_to_write(const std::filesystem::path& path) {
+  keep_campaign_files(path);
+  std::ofstream out(path, std::ios::binary);
+  if (!out) cannot_write(path, std::generic_category().message(errno));
+  return out;
+}
+
 void write_text(const std::filesystem::path& path, std::string_view text) {
   std::error_code error;
   if (std::filesystem::is_other(std::filesystem::status(path, error))) {
@@ -326,7 +339,7 @@ void write_text(const std::filesystem::path& path, std::string_view text) {
   constexpr int kMostLinks = 40;
   for (int links = 0; links < kMostLinks && std::filesystem::is_symlink(target, error); ++links)
     target = target.parent_path() / std::filesystem::read_symlink(target, error);
-  if (is_data_base(target)) cannot_write(path, "it is a campaign file; write to another name");
+  keep_campaign_files(target);
   std::filesystem::path partial = target;
   partial += fmt::format(".{}.part", ::getpid());
   const bool whole = put(partial, text);

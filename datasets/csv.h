@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <iosfwd>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -68,10 +69,10 @@ std::string csv_cell(std::string_view text);
 /// RFC 4180 text of the sheet, quoting only the cells that need it, lines ending in \n.
 std::string format_csv(const Sheet& sheet);
 
-/// Strict decimal number (no blanks inside, point as decimal mark, finite), or nothing.
 /// Whether a text is UTF-8 (RFC 3629): what can be stored, shown and written as JSON.
 bool is_utf8(std::string_view text);
 
+/// Strict decimal number (no blanks inside, point as decimal mark, finite), or nothing.
 std::optional<double> parse_number(std::string_view text);
 
 /// What to say of a path where nothing could be found: that it may not be looked at, or `otherwise`.
@@ -83,6 +84,10 @@ void make_folder(const std::filesystem::path& folder);
 
 /// Whole file as text; throws InputError where it cannot be read.
 std::string read_text(const std::filesystem::path& path);
+
+/// Opens a file to write bytes to as they come. Throws InputError where that cannot be, and where a campaign
+/// file is in the way.
+std::ofstream open_to_write(const std::filesystem::path& path);
 
 /// Writes a text file through a temporary one and a rename, so that it is whole or absent. Where the path
 /// leads to a device or a pipe, that takes the text; where it is a link to a file, the link stays. Throws

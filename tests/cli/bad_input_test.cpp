@@ -195,6 +195,10 @@ TEST_F(BadInput, ALogThatFailsLeavesNoFile) {
   EXPECT_THAT(refusal_of(log + "--location Q9 --speed max", {}),
               HasSubstr("does not know the location 'Q9'"));
   EXPECT_THAT(refusal_of(log + "--location OT --campaign none.toml", {}), HasSubstr("none.toml"));
+  EXPECT_THAT(refusal_of(log + "--location OT --speed max --capture none/bytes", {}),
+              HasSubstr("none/bytes: cannot be written: No such"));
+  EXPECT_THAT(refusal_of(log + "--location OT --speed max --capture c.db", {}),
+              HasSubstr("c.db: cannot be written: it is a campaign file"));
 }
 
 /// The file is made between this call's start and its refusal: it is not this call's to take away.

@@ -155,6 +155,20 @@ TEST_F(Chain, ALoggedRunHasANameThatNoImportedOneHas) {
   EXPECT_EQ(runs[3].run, "R0006");
 }
 
+/// The bytes of all runs of a plan, one after the other.
+TEST_F(Chain, ACaptureHoldsEveryRunOfAPlan) {
+  write_text(folder / "plan.csv", "session,location,repeat,duration_s\nS1,OT,1,2\nS1,OT,2,2\n");
+  expect_well("log --db c.db --plan plan.csv --speed max --capture both");
+  expect_well("log --db d.db --location OT --session S1 --duration 2 --speed max --capture one");
+  EXPECT_GE(fs::file_size(folder / "both"), 2 * 2666 * 10u);  // frames of 8 bytes and a status
+  EXPECT_LT(fs::file_size(folder / "one"), fs::file_size(folder / "both"));
+  const ProgramResult full =
+      run("log --db c.db --location OT --repeat 3 --session S1 --duration 1 --speed max --capture /dev/full");
+  EXPECT_EQ(full.code, 1);
+  EXPECT_THAT(full.error, HasSubstr("/dev/full: cannot be written any more"));
+  EXPECT_THAT(full.out, HasSubstr("R0003  S1 OT #3"));
+}
+
 /// It reads what it was given before it takes the file's write lock: a recorder would wait for it.
 TEST_F(Chain, ACalibrationThatReadsHoldsNobodyUp) {
   const test::ExampleCampaign campaign;

@@ -11,6 +11,7 @@
 
 #include <csignal>
 #include <cstdlib>
+#include <fstream>
 #include <memory>
 #include <thread>
 
@@ -39,9 +40,11 @@ TEST(Logger, StoresExactlyTheRun) {
   CampaignFile file = test::new_campaign(folder / "c.db");
   VirtualBoard board = counting_board(0);
   double last_elapsed = -1;
+  std::ofstream bytes(folder / "bytes", std::ios::binary);
   const LogOutcome outcome = log_run(
-      board, file, test::cells("R1"), {.duration_s = 12, .capture = folder / "bytes"}, test::summarizer(),
+      board, file, test::cells("R1"), {.duration_s = 12, .capture = &bytes}, test::summarizer(),
       [&](const LogProgress& progress) { last_elapsed = progress.elapsed_s; }, test::never_stop());
+  EXPECT_TRUE(bytes);
   EXPECT_EQ(outcome.state, RunState::kComplete);
   EXPECT_EQ(outcome.ledger.frames_stored, 16000u);
   EXPECT_EQ(outcome.ledger.source, "virtual");
@@ -99,6 +102,17 @@ TEST(Logger, ARunHasAFrame) {
                                      test::summarizer(), {}, test::never_stop());
   EXPECT_EQ(outcome.state, RunState::kComplete);
   EXPECT_EQ(outcome.ledger.frames_stored, 1u);
+}
+
+TEST(Logger, ACaptureThatCannotBeWrittenCostsNoRecording) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  VirtualBoard board = counting_board(0);
+  std::ofstream full("/dev/full", std::ios::binary);
+  const LogOutcome outcome = log_run(board, file, test::cells("R1"), {.duration_s = 2, .capture = &full},
+                                     test::summarizer(), {}, test::never_stop());
+  EXPECT_FALSE(full);
+  EXPECT_EQ(outcome.state, RunState::kComplete);
 }
 
 /// SQLite gives up after five seconds. A recorder waits, with the frames, until the other has written.

@@ -107,6 +107,16 @@ TEST(WriteText, KeepsLinksAndDevices) {
             "/dev/full: cannot be written: No space left on device");
 }
 
+TEST(OpenToWrite, SaysWhyNot) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "c.db", "SQLite format 3, say");
+  EXPECT_THAT(message_of([&] { open_to_write(folder / "c.db"); }), HasSubstr("it is a campaign file"));
+  EXPECT_THAT(message_of([&] { open_to_write(folder / "none" / "x"); }),
+              HasSubstr("cannot be written: No such"));
+  open_to_write(folder / "x") << "bytes";
+  EXPECT_EQ(read_text(folder / "x"), "bytes");
+}
+
 TEST(WriteText, NeverOverACampaignFile) {
   const test::TemporaryFolder folder;
   const std::string text = "SQLite format 3" + std::string(100, '\0');
