@@ -36,7 +36,7 @@ def bounds(conversions, priming):
 
 
 # Calls on the error path only: a converter overrun, which the manual's cure makes slow and which no frame depends on.
-ERROR_PATH = {"start_dma.isra.0", "board_on_adc_error", "ticks", "__aeabi_uldivmod"}
+ERROR_PATH = {"start_dma.isra.0", "board_frames_missed", "board_on_adc_error", "ticks", "__aeabi_uldivmod"}
 EXCEPTION = 12 + 12 + 2 * FLASH_REFILL  # entry and return
 
 

@@ -72,13 +72,6 @@ static const board_port port = {start, stop, ticks, lock, unlock, NULL, want_loa
 /* --- interrupts
  * ------------------------------------------------------------------------------------------------- */
 
-/* Frames of time between the last one and now, by the device clock. */
-static uint32_t frames_missed(const rig_board* b) {
-  uint64_t since = ticks(NULL) - b->origin_ticks;
-  uint64_t due = b->origin_sequence + since / b->rate.ticks_per_frame + 1u;
-  return due > b->sequence ? (uint32_t)(due - b->sequence) : 0u;
-}
-
 void on_sampling(void) {
   uint32_t began = RD(DWT_CYCCNT);
   const uint16_t* scans = NULL;
@@ -86,7 +79,7 @@ void on_sampling(void) {
   if (result == SAMPLING_FRAME) {
     board_on_scans(&instrument, scans);
   } else if (result == SAMPLING_ERROR) {
-    board_on_adc_error(&instrument, frames_missed(&instrument));
+    board_on_adc_error(&instrument, board_frames_missed(&instrument, ticks(NULL)));
   }
   uint32_t took = RD(DWT_CYCCNT) - began;
   /* cppcheck-suppress unsignedLessThanZero ; the two reads are of a running counter */

@@ -107,6 +107,13 @@ void board_on_scans(rig_board* b, const uint16_t* scans) {
   }
 }
 
+uint32_t board_frames_missed(const rig_board* b, uint64_t now_ticks) {
+  /* The origin is the end of the first frame: before it nothing can have been missed. */
+  if (now_ticks < b->origin_ticks) return 0;
+  uint64_t due = b->origin_sequence + (now_ticks - b->origin_ticks) / b->rate.ticks_per_frame + 1u;
+  return due > b->sequence ? (uint32_t)(due - b->sequence) : 0u;
+}
+
 void board_on_adc_error(rig_board* b, uint32_t frames_missed) {
   ++b->adc_errors;
   b->sequence += frames_missed;

@@ -82,6 +82,9 @@ void board_init(rig_board* b, const board_port* port, void* port_context, const 
 /* Sampling interrupt: the scans of one frame (rate.oversampling x TRW_CHANNELS conversions). */
 void board_on_scans(rig_board* b, const uint16_t* scans);
 
+/* Frames of time between the last one and `now_ticks` of the device clock, which no sample was taken for. */
+uint32_t board_frames_missed(const rig_board* b, uint64_t now_ticks);
+
 /* Sampling interrupt: a converter or DMA error; `frames_missed` frames of time went by unsampled. */
 void board_on_adc_error(rig_board* b, uint32_t frames_missed);
 

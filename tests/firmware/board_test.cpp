@@ -234,6 +234,18 @@ TEST(FirmwareBoard, ConverterErrorsAreTimeThatIsMissing) {
   EXPECT_EQ(statistics(board).adc_errors, 1u);
 }
 
+TEST(FirmwareBoard, AConverterErrorInTheFirstFrameMissesNothing) {
+  Board board;
+  board.enumerate();
+  vendor_out(board, TRW_USB_START);
+  const std::uint64_t origin = board.core.origin_ticks, frame = board.core.rate.ticks_per_frame;
+  EXPECT_EQ(board_frames_missed(&board.core, origin - frame / 2), 0u) << "the first frame is not yet due";
+  EXPECT_EQ(board_frames_missed(&board.core, origin), 1u);
+  EXPECT_EQ(board_frames_missed(&board.core, origin + 4 * frame + 1), 5u);
+  board.advance(5);
+  EXPECT_EQ(board_frames_missed(&board.core, origin + 4 * frame + 1), 0u);
+}
+
 TEST(FirmwareBoard, AnEmptyPacketEndsATransferOfWholePackets) {
   Board board;
   board.enumerate();
