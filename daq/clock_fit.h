@@ -16,21 +16,25 @@ struct ClockEstimate {
 };
 
 /// Takes the time of every packet. A packet arrives late, never early, so that of each half second only the
-/// one that came least late counts; through these a line is fitted (the rate), and a parabola (its drift).
-/// The intervals take the latenesses of different half seconds for independent.
+/// one that came least late counts, and of these only what does not lie far above the lower edge of them all:
+/// a backlog is late by seconds, and says nothing about the clock. Through the rest a line is fitted (the
+/// rate), and a parabola (its drift). The intervals take the latenesses of different half seconds for
+/// independent.
 class ClockFit {
  public:
   /// `ticks` of the last frame of a packet, which arrived at `time_s`. Another `boot_id` begins a new fit.
   void add(std::uint32_t boot_id, std::uint64_t ticks, std::uint32_t tick_hz, std::uint32_t ticks_per_frame,
            double time_s);
 
-  /// Nothing below ten seconds, or where the source has no clock.
+  /// Nothing below ten seconds, where the source has no clock, where most half seconds came late, or where
+  /// the rate's interval is wider than 0.1 %.
   std::optional<ClockEstimate> estimate() const;
 
  private:
   struct Point {
     double board_s, late_s;  // since the first packet; by how much the host's clock ran ahead of the board's
   };
+  std::vector<Point> on_time() const;
 
   bool started_ = false;
   std::uint32_t boot_id_ = 0, tick_hz_ = 0, ticks_per_frame_ = 0;
