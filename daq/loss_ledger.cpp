@@ -64,7 +64,8 @@ bool LossTracker::follow_boot(const trw_header& header, double time_s, FrameSink
 void LossTracker::take(const Packet& packet, double time_s, FrameSink& sink) {
   const trw_header& header = packet.header;
   if (complete()) return;
-  if (header.first_sequence > kHighestSequence) {
+  const bool rebooted = started_ && header.boot_id != boot_id_;  // a new count, which began at 0
+  if (header.first_sequence > (rebooted ? kImplausibleJump : kHighestSequence)) {
     ++ledger_.packets_corrupt;
     return;
   }

@@ -110,6 +110,11 @@ TEST(LossLedger, AbsurdNumbersAreNotBelieved) {
   EXPECT_EQ(t.tracker.ledger().frames_lost, 0u);
   t.take({.first = 16});
   EXPECT_EQ(t.tracker.ledger().frames_stored, 32u);
+  t.take({.first = std::uint64_t{1} << 50, .boot = 2});
+  EXPECT_EQ(t.tracker.ledger().packets_corrupt, 3u);
+  EXPECT_EQ(t.tracker.ledger().reboots, 0u);
+  t.take({.first = 32});
+  EXPECT_EQ(t.tracker.ledger().frames_stored, 48u) << "the boot under way goes on";
 }
 
 }  // namespace
