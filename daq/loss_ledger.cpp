@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace tunnelrig {
 namespace {
@@ -11,7 +12,7 @@ constexpr std::uint64_t kImplausibleJump = std::uint64_t{1} << 40;
 constexpr std::uint64_t kHighestSequence = std::uint64_t{1} << 62;
 
 /// Late frames are looked up in this many of the newest gaps.
-constexpr std::size_t kRememberedGaps = 256;
+constexpr std::ptrdiff_t kRememberedGaps = 256;
 
 const std::uint8_t* frame_at(const Packet& packet, std::size_t index) {
   return reinterpret_cast<const std::uint8_t*>(packet.frames.data()) + index * TRW_FRAME_SIZE;
@@ -86,7 +87,7 @@ void LossTracker::take(const Packet& packet, double time_s, FrameSink& sink) {
   } else if (first > next_sequence_) {
     const bool overrun = (status_of(packet, 0) & TRW_STATUS_OVERRUN) != 0;
     lost_ranges_.emplace_back(next_sequence_, first);
-    if (lost_ranges_.size() > kRememberedGaps) lost_ranges_.erase(lost_ranges_.begin());
+    forget_oldest();
     const char* unknown = noted_cause_ != nullptr ? noted_cause_ : "lost";
     lose(first - next_sequence_, overrun ? "overrun" : unknown, false, sink);
   }
@@ -116,14 +117,28 @@ void LossTracker::pass(const Packet& packet, std::size_t first, std::size_t coun
   sink.frames(std::as_bytes(std::span(samples_)));
 }
 
-/// Counts frames whose numbers have passed: late where they were booked as lost, duplicates otherwise.
+/// Counts frames whose numbers have passed: late where they were booked as lost and now come for the first
+/// time, duplicates otherwise.
 void LossTracker::drop(std::uint64_t first_sequence, std::uint64_t count) {
-  for (std::uint64_t sequence = first_sequence; sequence < first_sequence + count; ++sequence) {
-    const bool was_lost = std::any_of(lost_ranges_.rbegin(), lost_ranges_.rend(), [&](const auto& range) {
-      return sequence >= range.first && sequence < range.second;
-    });
-    ++(was_lost ? ledger_.frames_late : ledger_.frames_duplicate);
+  const std::uint64_t end_sequence = first_sequence + count;
+  std::uint64_t late = 0;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> left;
+  for (const auto& [first, end] : lost_ranges_) {
+    const std::uint64_t from = std::clamp(first_sequence, first, end),
+                        to = std::clamp(end_sequence, first, end);
+    late += to - from;
+    if (first < from) left.emplace_back(first, from);
+    if (to < end) left.emplace_back(to, end);
   }
+  lost_ranges_ = std::move(left);
+  forget_oldest();
+  ledger_.frames_late += late;
+  ledger_.frames_duplicate += count - late;
+}
+
+void LossTracker::forget_oldest() {
+  if (std::ssize(lost_ranges_) > kRememberedGaps)
+    lost_ranges_.erase(lost_ranges_.begin(), lost_ranges_.end() - kRememberedGaps);
 }
 
 }  // namespace tunnelrig

@@ -41,6 +41,7 @@ class LossTracker {
   void lose(std::uint64_t frames, const char* cause, bool estimated, FrameSink& sink);
   void pass(const Packet& packet, std::size_t first, std::size_t count, FrameSink& sink);
   void drop(std::uint64_t first_sequence, std::uint64_t count);
+  void forget_oldest();
 
   std::uint64_t frames_wanted_;
   Ledger ledger_;
@@ -51,7 +52,7 @@ class LossTracker {
   const char* noted_cause_ = nullptr;
   double last_time_s_ = 0;
   std::vector<std::pair<std::uint64_t, std::uint64_t>>
-      lost_ranges_;                    // [first, end) of this boot, newest last
+      lost_ranges_;                    // [first, end) of this boot that never came, newest last
   std::vector<std::int16_t> samples_;  // of one packet
 };
 

@@ -67,6 +67,28 @@ TEST(LossLedger, DuplicatesAndLateFramesAreToldApartAndDropped) {
   EXPECT_EQ(t.list.samples.back(), test::sample_of(55, 3));
 }
 
+TEST(LossLedger, ALateFrameIsLateOnceAndThenADuplicate) {
+  Tracking t;
+  t.take({.first = 0});
+  t.take({.first = 48});
+  for (int copy = 0; copy < 3; ++copy) t.take({.first = 24});  // the middle of the gap, three times
+  EXPECT_EQ(t.tracker.ledger().frames_late, 16u);
+  EXPECT_EQ(t.tracker.ledger().frames_duplicate, 32u);
+  t.take({.first = 16, .count = 8});
+  t.take({.first = 40, .count = 8});
+  EXPECT_EQ(t.tracker.ledger().frames_late, 32u) << "both ends of the gap are still open";
+  EXPECT_EQ(t.tracker.ledger().frames_lost, 32u);
+}
+
+TEST(LossLedger, TheNewest256GapsAreRemembered) {
+  Tracking t;
+  for (std::uint64_t i = 0; i <= 257; ++i) t.take({.first = 32 * i});
+  t.take({.first = 16});  // the oldest of 257 gaps
+  EXPECT_EQ(t.tracker.ledger().frames_duplicate, 16u);
+  t.take({.first = 48});
+  EXPECT_EQ(t.tracker.ledger().frames_late, 16u);
+}
+
 TEST(LossLedger, ARebootIsAGapNotARestart) {
   Tracking t;
   t.take({.first = 5000, .boot = 7}, 10.000);
