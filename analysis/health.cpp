@@ -190,12 +190,18 @@ class Examination {
   }
 
   void channels() {
-    Names stuck, dead, clipped, overloaded;
+    Names stuck, dead, clipped, flagged, pattern, overloaded;
     for (const Run& run : data_.runs) {
       const auto statistics = data_.statistics.find(run.run);
       if (statistics == data_.statistics.end() || !run.excluded.empty()) continue;
       const auto raw = data_.raw.find(run.run);
       const bool counts = raw != data_.raw.end() && is_counts(raw->second.format.type);
+      const auto ledger = raw == data_.raw.end() ? std::nullopt : ledger_of(file_, raw->second.id);
+      if (ledger && ledger->frames_test_pattern > 0) pattern.add(run.run);
+      if (ledger && ledger->frames_clipped > 0)
+        flagged.add(fmt::format("{} ({:.2g} %)", run.run,
+                                100.0 * static_cast<double>(ledger->frames_clipped) /
+                                    static_cast<double>(ledger->frames_stored)));
       for (int rotor = 0; rotor < data_.info.rig.rotors; ++rotor) {
         const ChannelStatistics& channel = statistics->second.channels[static_cast<std::size_t>(rotor)];
         const std::string name = fmt::format("{} channel {}", run.run, rotor + 1);
@@ -223,10 +229,17 @@ class Examination {
     if (!clipped.empty())
       problem("channels", "clipped: " + clipped.text(),
               "lower the amplifier's gain; clipped means are biased");
+    if (!flagged.empty())
+      problem("channels", "the board flags frames as clipped: " + flagged.text(),
+              "lower the amplifier's gain; clipped means are biased");
+    if (!pattern.empty())
+      problem("channels", "the board's test pattern, no measurements: " + pattern.text(),
+              "exclude these runs and record them again without the test pattern");
     if (!overloaded.empty())
       note("channels", "mean thrust outside the calibrated forces: " + overloaded.text(),
            "calibrate over the range that is measured");
-    if (stuck.empty() && dead.empty() && clipped.empty()) good("channels", "none stuck, dead or clipped");
+    if (stuck.empty() && dead.empty() && clipped.empty() && flagged.empty() && pattern.empty())
+      good("channels", "none stuck, dead or clipped");
   }
 
   void metadata() {

@@ -250,6 +250,15 @@ int Logging::report(const std::string& name, const PlannedRun& planned, const Lo
                     ledger.packets_corrupt, ledger.reboots, ledger.silences));
     problem = true;
   }
+  if (ledger.frames_test_pattern > 0) {
+    warn(fmt::format("run {}: {} frames are the board's test pattern, no measurements", name,
+                     ledger.frames_test_pattern));
+    problem = true;
+  }
+  if (ledger.frames_clipped > 0) {
+    warn(fmt::format("run {}: the board flags {} frames as clipped", name, ledger.frames_clipped));
+    problem = true;
+  }
   if (ledger.board_rate_hz && std::abs(*ledger.board_rate_hz / info_.daq.sample_rate_hz - 1) > 1e-3) {
     warn(fmt::format("run {}: the board samples at {:.3f} Hz, campaign.toml says {:.3f} Hz", name,
                      *ledger.board_rate_hz, info_.daq.sample_rate_hz));

@@ -111,6 +111,8 @@ void LossTracker::pass(const Packet& packet, std::size_t first, std::size_t coun
     samples_.insert(samples_.end(), std::begin(frame.sample), std::end(frame.sample));
     if ((frame.status & TRW_STATUS_OVERRUN) != 0) ++ledger_.frames_overrun;
     if ((frame.status & TRW_STATUS_ADC_ERROR) != 0) ++ledger_.frames_adc_error;
+    if ((frame.status & TRW_STATUS_CLIPPED_MASK) != 0) ++ledger_.frames_clipped;
+    if ((frame.status & TRW_STATUS_TEST_PATTERN) != 0) ++ledger_.frames_test_pattern;
   }
   ledger_.frames_stored += count;
   ledger_.frames_emitted += count;

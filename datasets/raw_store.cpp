@@ -29,8 +29,8 @@ void write_ledger(const Database& database, std::int64_t raw_run, const Ledger& 
       "frames_duplicate, "
       "frames_late, packets_corrupt, bytes_skipped, frames_overrun, frames_adc_error, reboots, silences, "
       "boot_id, first_sequence, board_rate_hz, rate_interval_hz, drift_ppm_h, drift_interval_ppm_h, "
-      "end_reason, source) "
-      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
+      "end_reason, source, frames_clipped, frames_test_pattern) "
+      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
       .bind(raw_run)
       .bind(as_sql(ledger.frames_emitted))
       .bind(as_sql(ledger.frames_stored))
@@ -51,6 +51,8 @@ void write_ledger(const Database& database, std::int64_t raw_run, const Ledger& 
       .bind(ledger.drift_interval_ppm_h)
       .bind(ledger.end_reason)
       .bind(ledger.source)
+      .bind(as_sql(ledger.frames_clipped))
+      .bind(as_sql(ledger.frames_test_pattern))
       .run();
 }
 
@@ -218,12 +220,18 @@ std::vector<Gap> gaps_of(const CampaignFile& file, std::int64_t raw_run) {
 }
 
 std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run) {
+  // A file of version 1 that is only read has no counts of these flags.
+  const bool flags = file.database().scalar_integer("PRAGMA user_version") >= 2;
   Statement select(
       file.database(),
-      "SELECT frames_emitted, frames_stored, frames_lost, frames_duplicate, frames_late, packets_corrupt, "
-      "bytes_skipped, frames_overrun, frames_adc_error, reboots, silences, boot_id, first_sequence, "
-      "board_rate_hz, rate_interval_hz, drift_ppm_h, drift_interval_ppm_h, end_reason, source FROM ledgers "
-      "WHERE raw_run = ?");
+      fmt::format(
+          "SELECT frames_emitted, frames_stored, frames_lost, frames_duplicate, frames_late, "
+          "packets_corrupt, "
+          "bytes_skipped, frames_overrun, frames_adc_error, reboots, silences, boot_id, first_sequence, "
+          "board_rate_hz, rate_interval_hz, drift_ppm_h, drift_interval_ppm_h, end_reason, source, {} FROM "
+          "ledgers "
+          "WHERE raw_run = ?",
+          flags ? "frames_clipped, frames_test_pattern" : "0, 0"));
   select.bind(raw_run);
   if (!select.step()) return {};
   return Ledger{.frames_emitted = from_sql(select.integer(0)),
@@ -235,6 +243,8 @@ std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run) 
                 .bytes_skipped = from_sql(select.integer(6)),
                 .frames_overrun = from_sql(select.integer(7)),
                 .frames_adc_error = from_sql(select.integer(8)),
+                .frames_clipped = from_sql(select.integer(19)),
+                .frames_test_pattern = from_sql(select.integer(20)),
                 .reboots = from_sql(select.integer(9)),
                 .silences = from_sql(select.integer(10)),
                 .boot_id = static_cast<std::uint32_t>(select.integer(11)),

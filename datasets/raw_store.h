@@ -27,6 +27,8 @@ struct Ledger {
   std::uint64_t bytes_skipped = 0;
   std::uint64_t frames_overrun = 0;
   std::uint64_t frames_adc_error = 0;
+  std::uint64_t frames_clipped = 0;       // a channel at the end of the converter's range
+  std::uint64_t frames_test_pattern = 0;  // a counter instead of measurements
   std::uint64_t reboots = 0;
   std::uint64_t silences = 0;
   std::uint32_t boot_id = 0;

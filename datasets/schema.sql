@@ -128,3 +128,9 @@ CREATE TABLE documents (
   document        TEXT NOT NULL CHECK (json_valid(document))
 );
 CREATE INDEX documents_by_kind ON documents (kind, id);
+
+-- @version 2
+
+-- Frames that the board flags: a channel at the end of the converter's range; a test pattern, no measurement.
+ALTER TABLE ledgers ADD COLUMN frames_clipped INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE ledgers ADD COLUMN frames_test_pattern INTEGER NOT NULL DEFAULT 0;

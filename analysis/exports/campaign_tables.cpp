@@ -193,6 +193,10 @@ Table recordings_table(const CampaignFile& file, const std::vector<RawRun>& raw,
       .column("frames_late", "1", "Arrived too late, dropped", ledger_number(&Ledger::frames_late))
       .column("frames_overrun", "1", "With the board's flag", ledger_number(&Ledger::frames_overrun))
       .column("frames_adc_error", "1", "With the board's flag", ledger_number(&Ledger::frames_adc_error))
+      .column("frames_clipped", "1", "With the board's flag of a channel at the converter's end",
+              ledger_number(&Ledger::frames_clipped))
+      .column("frames_test_pattern", "1", "With the board's flag: no measurements",
+              ledger_number(&Ledger::frames_test_pattern))
       .column("packets_corrupt", "1", "Could not be used", ledger_number(&Ledger::packets_corrupt))
       .column("bytes_skipped", "1", "Could not be used", ledger_number(&Ledger::bytes_skipped))
       .column("reboots", "1", "Of the board", ledger_number(&Ledger::reboots))

@@ -107,6 +107,10 @@ void LiveFeed::check(const Shared& now, const Scale& scale, Time time) {
   alarms_.set("loss", 0, recording && ledger.frames_lost > 0,
               fmt::format("{} of {} frames lost in this run", ledger.frames_lost, ledger.frames_emitted),
               time);
+  alarms_.set("test_pattern", 0, recording && ledger.frames_test_pattern > 0,
+              "the board sends its test pattern, no measurements", time);
+  alarms_.set("clipping", 0, recording && ledger.frames_clipped > 0,
+              fmt::format("the board flags {} frames of this run as clipped", ledger.frames_clipped), time);
   const double nominal = info_.rig.nominal_speed_rpm;
   const auto off = [&](double rpm) { return std::abs(rpm / nominal - 1) > kSpeedTolerance; };
   const bool thrust = recording && run.kind == RunKind::kThrust;

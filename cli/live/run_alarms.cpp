@@ -30,6 +30,8 @@ std::string alarms_of(const LogOutcome& outcome, const Scale& scale, const Campa
                                    std::abs(scale.value(c, channel.highest_V / volts)));
     if (scale.newtons && most_N > info.rig.cell_limit_N) kinds.insert("overload");
   }
+  if (outcome.ledger.frames_clipped > 0) kinds.insert("clipping");
+  if (outcome.ledger.frames_test_pattern > 0) kinds.insert("test_pattern");
   if (outcome.ledger.frames_lost > 0) kinds.insert("loss");
   if (outcome.ledger.silences > 0) kinds.insert("silent");
   return fmt::format("{}", fmt::join(kinds, ";"));

@@ -105,8 +105,10 @@ TEST_F(Health, AnOldCertificateAndAnOpenLedger) {
     file.database().execute(
         "INSERT INTO ledgers VALUES (1, 500, 400, 50, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, NULL, NULL, NULL, NULL, "
         "'complete', "
-        "'tcp:x')");
+        "'tcp:x', 40, 400)");
   }
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("the board flags frames as clipped: R1 (10 %)"));
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("the board's test pattern, no measurements: R1"));
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("calibration: made from other points"));
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("loss ledger: emitted is not stored plus lost in R1"));
 }

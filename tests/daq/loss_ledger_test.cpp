@@ -53,6 +53,16 @@ TEST(LossLedger, AJumpIsAGapWithItsLengthAndCause) {
   EXPECT_EQ(t.tracker.ledger().frames_overrun, 1u);
 }
 
+TEST(LossLedger, CountsWhatTheBoardFlags) {
+  Tracking t;
+  t.take({.first = 0, .first_status = 0x0005});
+  t.take({.first = 16, .first_status = TRW_STATUS_TEST_PATTERN});
+  t.take({.first = 32, .first_status = TRW_STATUS_TEST_PATTERN | 0x0008});
+  EXPECT_EQ(t.tracker.ledger().frames_clipped, 2u);
+  EXPECT_EQ(t.tracker.ledger().frames_test_pattern, 2u);
+  EXPECT_EQ(t.tracker.ledger().frames_adc_error, 0u);
+}
+
 TEST(LossLedger, DuplicatesAndLateFramesAreToldApartAndDropped) {
   Tracking t;
   t.take({.first = 0});

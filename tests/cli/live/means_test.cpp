@@ -95,6 +95,9 @@ TEST(RunAlarms, AreFoundInAllOfTheRunsFrames) {
       4, {.std_V = 5 * volts, .lowest_V = 2400 * volts, .highest_V = 2600 * volts});
   EXPECT_EQ(alarms_of(outcome, rig.scale, rig.info, ""), "");
   EXPECT_EQ(alarms_of(outcome, rig.scale, rig.info, "speed;tare_drift"), "speed;tare_drift");
+  LogOutcome flagged = outcome;
+  flagged.ledger.frames_clipped = flagged.ledger.frames_test_pattern = 1;
+  EXPECT_EQ(alarms_of(flagged, rig.scale, rig.info, ""), "clipping;test_pattern");
   outcome.statistics.channels[0].clipped = 1;
   outcome.statistics.channels[1].lowest_V = outcome.statistics.channels[1].highest_V;
   outcome.statistics.channels[2].std_V = 0.1 * volts;
