@@ -62,11 +62,15 @@ void VirtualBoard::step() {
     if (std::exchange(down_, false)) {
       ++boot_id_;
       sequence_ = 0;
+      overruns_ = 0;
     }
     std::vector<std::byte> packet = sample_packet();
     const double held_s = static_cast<double>(ring_.size() * kFramesPerPacket) / settings_.frame_rate_hz;
     lost_some_ = held_s >= kRing_s;
-    if (!lost_some_) ring_.push_back(std::move(packet));
+    if (lost_some_)
+      overruns_ += kFramesPerPacket;
+    else
+      ring_.push_back(std::move(packet));
     ring_peak_ = std::max<std::uint64_t>(ring_peak_, ring_.size() * kFramesPerPacket);
   }
   clock_frames_ += kFramesPerPacket;
@@ -87,10 +91,7 @@ std::vector<std::byte> VirtualBoard::sample_packet() {
   trw_put_header(out, &header);
   for (std::size_t i = 0; i < kFramesPerPacket; ++i) {
     trw_frame frame = sample_();
-    if (lost_some_ && i == 0) {
-      frame.status = static_cast<std::uint16_t>(frame.status | TRW_STATUS_OVERRUN);
-      ++overruns_;
-    }
+    if (lost_some_ && i == 0) frame.status = static_cast<std::uint16_t>(frame.status | TRW_STATUS_OVERRUN);
     trw_put_frame(out + TRW_HEADER_SIZE + i * TRW_FRAME_SIZE, &frame);
   }
   const std::size_t body = packet.size() - TRW_CRC_SIZE;

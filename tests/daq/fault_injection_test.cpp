@@ -104,6 +104,23 @@ TEST(Faults, AShortStallLosesNothingALongOneOverruns) {
   EXPECT_GE(overrun.outcome.ledger.silences, 1u);
 }
 
+TEST(Faults, TheBoardCountsTheFramesThatItLost) {
+  VirtualBoard board({.frame_rate_hz = kRate_hz, .faults = parse_faults("stall=5:6")},
+                     [] { return trw_frame{}; });
+  test::PacketList packets;
+  PacketDecoder decoder;
+  std::vector<std::byte> bytes(4096);
+  while (static_cast<double>(board.frames_sampled()) < 20 * kRate_hz)
+    decoder.push(std::span(bytes).first(board.read(bytes, std::chrono::milliseconds(50)).size), packets);
+  std::uint64_t next = 0, lost = 0;
+  for (const auto& seen : packets.seen) {
+    lost += seen.header.first_sequence - next;
+    next = seen.header.first_sequence + seen.header.frame_count;
+  }
+  EXPECT_GT(lost, 0u);
+  EXPECT_EQ(packets.seen.back().header.overruns, lost);
+}
+
 TEST(Faults, ARebootIsAGapOfTheRightLength) {
   const Logged logged = log_with("reboot=10:0.8", 30, 1);
   ASSERT_EQ(logged.gaps.size(), 1u);
