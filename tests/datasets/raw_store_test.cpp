@@ -132,6 +132,25 @@ TEST_F(RawStore, InterruptedRunsBecomePartial) {
   EXPECT_TRUE(close_interrupted_runs(file).empty());
 }
 
+TEST_F(RawStore, FlagsAreKeptAndAFileFromBeforeThemIsStillRead) {
+  RawWriter writer(file, "R1", {}, 133);
+  writer.frames(frames(0, 100));
+  writer.finish(RunState::kComplete, Ledger{.frames_emitted = 100,
+                                            .frames_stored = 100,
+                                            .frames_clipped = 40,
+                                            .frames_test_pattern = 50,
+                                            .source = "tcp:x"});
+  const std::int64_t id = raw_run(file, "R1")->id;
+  EXPECT_EQ(ledger_of(file, id)->frames_clipped, 40u);
+  EXPECT_EQ(ledger_of(file, id)->frames_test_pattern, 50u);
+  file.database().execute(
+      "ALTER TABLE ledgers DROP COLUMN frames_clipped; ALTER TABLE ledgers DROP COLUMN frames_test_pattern;"
+      "PRAGMA user_version = 1");
+  EXPECT_EQ(ledger_of(file, id)->frames_stored, 100u);
+  EXPECT_EQ(ledger_of(file, id)->frames_clipped, 0u);
+  EXPECT_EQ(ledger_of(file, id)->source, "tcp:x");
+}
+
 TEST_F(RawStore, RunsAreNamedOnce) {
   RawWriter writer(file, "R1", {}, 100);
   EXPECT_THAT(message_of([&] { RawWriter(file, "R1", {}, 100); }), HasSubstr("run R1 is in"));
