@@ -109,14 +109,19 @@ class RunSink : public FrameSink {
 /// Packets into the tracker, stamped with the time of the block they came in.
 class TrackerSink : public PacketSink {
  public:
-  TrackerSink(LossTracker& tracker, FrameSink& sink) : tracker_(tracker), sink_(sink) {}
+  /// Before the first packet the longest that there may be is waited for.
+  TrackerSink(LossTracker& tracker, FrameSink& sink, double rate_hz)
+      : tracker_(tracker), sink_(sink), packet_s_(static_cast<double>(TRW_MAX_FRAMES) / rate_hz) {}
   void packet(const Packet& packet) override {
     const trw_header& header = packet.header;
     clock_.add(header.boot_id,
                header.first_ticks + (header.frame_count - std::uint64_t{1}) * header.ticks_per_frame,
                header.tick_hz, header.ticks_per_frame, time_s_);
     tracker_.take(packet, time_s_, sink_);
+    if (header.tick_hz > 0)
+      packet_s_ = static_cast<double>(header.frame_count) * header.ticks_per_frame / header.tick_hz;
   }
+  double packet_s() const { return packet_s_; }  // that the last one spans
   const ClockFit& clock() const { return clock_; }
   void set_time(double time_s) { time_s_ = time_s; }
 
@@ -124,7 +129,7 @@ class TrackerSink : public PacketSink {
   LossTracker& tracker_;
   FrameSink& sink_;
   ClockFit clock_;
-  double time_s_ = 0;
+  double packet_s_, time_s_ = 0;
 };
 
 /// Notices that no new frame comes, by the source's own clock (the virtual rig's runs faster than ours).
@@ -134,18 +139,20 @@ class Watchdog {
 
   Watchdog(double silence_s, double give_up_s) : silence_s_(silence_s), give_up_s_(give_up_s) {}
 
-  Verdict look(std::uint64_t frames, double time_s) {
+  /// A slow board is not a silent one: three of its packets.
+  Verdict look(std::uint64_t frames, double time_s, double packet_s) {
+    const double silence_s = std::max(silence_s_, 3 * packet_s);
     if (!started_ || frames != frames_) {
       started_ = true;
       silent_ = false;
       frames_ = frames;
       since_s_ = time_s;
-      next_alarm_s_ = time_s + silence_s_;
+      next_alarm_s_ = time_s + silence_s;
       return Verdict::kFine;
     }
     if (time_s - since_s_ >= give_up_s_) return Verdict::kGiveUp;
     if (time_s < next_alarm_s_) return Verdict::kFine;
-    next_alarm_s_ = time_s + silence_s_;
+    next_alarm_s_ = time_s + silence_s;
     return std::exchange(silent_, true) ? Verdict::kStillSilent : Verdict::kBecameSilent;
   }
 
@@ -170,7 +177,7 @@ class Recording {
         file_(file),
         writer_(file, run, RawFormat{}, static_cast<std::size_t>(kChunk_s * rate_hz_)),
         sink_(writer_, summarizer, settings.watcher),
-        packets_(tracker_, sink_),
+        packets_(tracker_, sink_, rate_hz_),
         watchdog_(settings.silence_s, settings.give_up_s),
         source_(source) {}
 
@@ -239,11 +246,13 @@ class Recording {
     packets_.set_time(block.time_s);
     if (block.cause != nullptr) tracker_.note_cause(block.cause);
     decoder_.push(block.bytes, packets_);
+    if (const auto rate_hz = tracker_.changed_rate_hz())
+      return fmt::format("the board's rate changed to {:.3f} frames/s", *rate_hz);
     if (block.status == ReadResult::Status::kEnd) {
       decoder_.finish(packets_);
       return tracker_.complete() ? "" : "the source ended";
     }
-    switch (watchdog_.look(tracker_.ledger().frames_stored, block.time_s)) {
+    switch (watchdog_.look(tracker_.ledger().frames_stored, block.time_s, packets_.packet_s())) {
       case Watchdog::Verdict::kFine:
         break;
       case Watchdog::Verdict::kBecameSilent:

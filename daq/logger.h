@@ -26,7 +26,8 @@ struct LogSettings {
   /// a kill costs at most the last 0.1 s.
   std::chrono::milliseconds commit_interval{75};
 
-  double silence_s = 1;   // without a new frame for so long, the source counts as silent and is reopened
+  /// Without a new frame for so long, and for three packets, the source counts as silent and is reopened;
+  double silence_s = 1;
   double give_up_s = 30;  // and after so long the run ends as partial
 
   /// The bytes as received go here too, for `--source replay:FILE`; flushed when the run ends. That it cannot

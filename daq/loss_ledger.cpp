@@ -11,6 +11,8 @@ namespace {
 constexpr std::uint64_t kImplausibleJump = std::uint64_t{1} << 40;
 constexpr std::uint64_t kHighestSequence = std::uint64_t{1} << 62;
 
+constexpr double kSameRate = 1e-3;  // what a device that measures its own period may vary by
+
 /// Late frames are looked up in this many of the newest gaps.
 constexpr std::ptrdiff_t kRememberedGaps = 256;
 
@@ -34,7 +36,8 @@ void LossTracker::start(const trw_header& header) {
   next_sequence_ = header.first_sequence;
   ledger_.boot_id = header.boot_id;
   ledger_.first_sequence = header.first_sequence;
-  if (rate_of(header) > 0) ledger_.board_rate_hz = rate_of(header);
+  first_rate_hz_ = rate_of(header);
+  if (first_rate_hz_ > 0) ledger_.board_rate_hz = first_rate_hz_;
 }
 
 void LossTracker::lose(std::uint64_t frames, const char* cause, bool estimated, FrameSink& sink) {
@@ -64,13 +67,17 @@ bool LossTracker::follow_boot(const trw_header& header, double time_s, FrameSink
 
 void LossTracker::take(const Packet& packet, double time_s, FrameSink& sink) {
   const trw_header& header = packet.header;
-  if (complete()) return;
+  if (complete() || changed_rate_hz_) return;
   const bool rebooted = started_ && header.boot_id != boot_id_;  // a new count, which began at 0
   if (header.first_sequence > (rebooted ? kImplausibleJump : kHighestSequence)) {
     ++ledger_.packets_corrupt;
     return;
   }
   if (!started_) start(header);
+  if (std::abs(rate_of(header) - first_rate_hz_) > kSameRate * first_rate_hz_) {
+    changed_rate_hz_ = rate_of(header);
+    return;
+  }
   if (!follow_boot(header, time_s, sink)) {
     ledger_.frames_late += header.frame_count;
     return;

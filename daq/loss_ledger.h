@@ -30,6 +30,10 @@ class LossTracker {
   /// static text.
   void note_cause(const char* cause) { noted_cause_ = cause; }
 
+  /// Frames per second of a packet that were not those of the run's first one, by more than 0.1 %: from there
+  /// on nothing is taken, since a run has one rate.
+  std::optional<double> changed_rate_hz() const { return changed_rate_hz_; }
+
   bool complete() const { return frames_wanted_ != 0 && ledger_.frames_emitted >= frames_wanted_; }
 
   /// The sums so far. The counts that only others know (corrupt packets, silences) are theirs to fill in.
@@ -44,6 +48,8 @@ class LossTracker {
   void forget_oldest();
 
   std::uint64_t frames_wanted_;
+  double first_rate_hz_ = 0;
+  std::optional<double> changed_rate_hz_;
   Ledger ledger_;
   bool started_ = false;
   std::uint32_t boot_id_ = 0;

@@ -9,6 +9,7 @@
 #include "datasets/statistics_store.h"
 #include "support/wall_clock.h"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
@@ -75,6 +76,62 @@ TEST(Logger, UserMayStopARun) {
   if (test::kClockCounts) {
     EXPECT_NEAR(static_cast<double>(outcome.ledger.frames_stored), 0.6 * kRate_hz, 0.3 * kRate_hz);
   }
+}
+
+/// A packet of 16 frames whenever they are due, on a clock of its own that every look moves on by 0.2 s.
+class SlowBoard : public PacketSource {
+ public:
+  explicit SlowBoard(std::uint32_t ticks_per_frame) : ticks_per_frame_(ticks_per_frame) {}
+  ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds) override {
+    time_s_ += 0.2;
+    if (time_s_ < static_cast<double>((next_ + 16) * ticks_per_frame_) / 84e6)
+      return {ReadResult::Status::kNothing, 0, time_s_};
+    const auto bytes = test::packet_bytes({.first = next_, .ticks_per_frame = ticks_per_frame_});
+    std::copy(bytes.begin(), bytes.end(), buffer.begin());
+    next_ += 16;
+    return {ReadResult::Status::kData, bytes.size(), time_s_};
+  }
+  bool reopen() override {
+    ++reopened;
+    return true;
+  }
+  std::string name() const override { return "slow"; }
+  int reopened = 0;
+
+ private:
+  std::uint32_t ticks_per_frame_;
+  std::uint64_t next_ = 0;
+  double time_s_ = 0;
+};
+
+TEST(Logger, ASlowBoardIsNotASilentOne) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  SlowBoard board(8400000);  // 10 frames/s, a packet every 1.6 s
+  const LogOutcome outcome = log_run(board, file, test::cells("R1"), {.duration_s = 160 / kRate_hz},
+                                     test::summarizer(), {}, test::never_stop());
+  EXPECT_EQ(outcome.state, RunState::kComplete);
+  EXPECT_LE(board.reopened, 1) << "before its first packet nobody knows how slow it is";
+  EXPECT_LE(outcome.ledger.silences, 1u);
+}
+
+TEST(Logger, ARunEndsWhereTheRateChanges) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  {
+    std::ofstream bytes(folder / "bytes", std::ios::binary);
+    for (const test::PacketSpec& spec :
+         {test::PacketSpec{.first = 0}, test::PacketSpec{.first = 16, .ticks_per_frame = 63000}}) {
+      const auto packet = test::packet_bytes(spec);
+      bytes.write(reinterpret_cast<const char*>(packet.data()), static_cast<std::streamsize>(packet.size()));
+    }
+  }
+  const auto replay = open_source("replay:" + (folder / "bytes").string());
+  const LogOutcome outcome = log_run(*replay, file, test::cells("R1"), {.duration_s = 12}, test::summarizer(),
+                                     {}, test::never_stop());
+  EXPECT_EQ(outcome.state, RunState::kPartial);
+  EXPECT_EQ(outcome.ledger.end_reason, "the board's rate changed to 1333.333 frames/s");
+  EXPECT_EQ(outcome.ledger.frames_stored, 16u);
 }
 
 TEST(Logger, ARunIsNotRecordedTwice) {

@@ -63,6 +63,20 @@ TEST(LossLedger, CountsWhatTheBoardFlags) {
   EXPECT_EQ(t.tracker.ledger().frames_adc_error, 0u);
 }
 
+TEST(LossLedger, ARunHasOneRate) {
+  for (const std::uint32_t boot : {1u, 2u}) {
+    Tracking t;
+    t.take({.first = 0});
+    t.take({.first = 16, .ticks_per_frame = 84010});
+    EXPECT_FALSE(t.tracker.changed_rate_hz()) << "a device that measures its period";
+    t.take({.first = 32, .boot = boot, .ticks_per_frame = 63000});
+    EXPECT_NEAR(t.tracker.changed_rate_hz().value(), 4000.0 / 3, 1e-9);
+    t.take({.first = 48});
+    EXPECT_EQ(t.tracker.ledger().frames_stored, 32u);
+    EXPECT_EQ(t.tracker.ledger().frames_lost, 0u);
+  }
+}
+
 TEST(LossLedger, DuplicatesAndLateFramesAreToldApartAndDropped) {
   Tracking t;
   t.take({.first = 0});

@@ -12,8 +12,8 @@ std::vector<std::byte> packet_bytes(const PacketSpec& spec) {
   const trw_header header{.boot_id = spec.boot,
                           .tick_hz = 84000000,
                           .first_sequence = spec.first,
-                          .first_ticks = spec.first * 84000,
-                          .ticks_per_frame = 84000,
+                          .first_ticks = spec.first * spec.ticks_per_frame,
+                          .ticks_per_frame = spec.ticks_per_frame,
                           .overruns = 0,
                           .frame_count = spec.count};
   std::vector<trw_frame> frames(spec.count);

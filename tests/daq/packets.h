@@ -17,9 +17,10 @@ struct PacketSpec {
   std::uint8_t count = 16;
   std::uint32_t boot = 1;
   std::uint16_t first_status = 0;
+  std::uint32_t ticks_per_frame = 84000;  // of 84 MHz
 };
 
-/// The bytes of a packet of recognisable frames at 1000 frames/s.
+/// The bytes of a packet of recognisable frames, at 1000 frames/s unless said otherwise.
 std::vector<std::byte> packet_bytes(const PacketSpec& spec);
 
 /// Keeps what a decoder finds.
