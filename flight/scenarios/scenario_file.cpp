@@ -1,4 +1,5 @@
 #include "datasets/error.h"
+#include "datasets/toml_keys.h"
 #include "flight/scenarios/scenario.h"
 
 #include <cmath>
@@ -14,6 +15,10 @@ namespace {
 class Fields {
  public:
   Fields(const toml::table& table, const std::string& file) : table_(table), file_(file) {}
+
+  void require_only(const std::string& owner, std::initializer_list<std::string_view> known) const {
+    require_known_keys(table_, owner, file_, known);
+  }
 
   int line() const { return static_cast<int>(table_.source().begin.line); }
 
@@ -78,16 +83,21 @@ void add_segment(Trajectory& trajectory, const Plane& start, const Fields& f, co
       trajectory.segments().empty() ? start : trajectory.at(trajectory.duration_s() + 1).position_m;
   const Trajectory before = trajectory;
   const std::string kind = f.text("kind");
+  const auto keys = [&](std::initializer_list<std::string_view> known) { f.require_only(kind, known); };
   if (kind == "hold") {
+    keys({"kind", "duration_s"});
     trajectory.hold(here, f.required("duration_s", 0.01, kLongest_s));
   } else if (kind == "move") {
+    keys({"kind", "to", "acceleration_m_s2", "speed_m_s"});
     if (trajectory.segments().empty()) trajectory.hold(here, 0);
     trajectory.move(f.pair("to", -kFar_m, kFar_m), f.required("acceleration_m_s2", 0.001, 10),
                     f.number("speed_m_s", 0.001, 20).value_or(0));
   } else if (kind == "circle") {
+    keys({"kind", "centre", "radius_m", "rate_rad_s", "turns"});
     trajectory.circle(f.pair("centre", -kFar_m, kFar_m), f.required("radius_m", 0.001, kFar_m),
                       f.required("rate_rad_s", -20, 20), f.required("turns", 0.01, 1000));
   } else if (kind == "figure") {
+    keys({"kind", "centre", "amplitude", "rates_rad_s", "duration_s"});
     trajectory.figure(f.pair("centre", -kFar_m, kFar_m), f.pair("amplitude", -kFar_m, kFar_m),
                       f.pair("rates_rad_s", -20, 20), f.required("duration_s", 0.01, kLongest_s));
   } else {
@@ -111,6 +121,7 @@ Scenario parse_scenario(std::string_view text, const std::string& file) {
   const Fields fields(document, file);
   if (fields.text("format") != "tunnelrig-scenario/1")
     throw InputError::in(file, "must say format = \"tunnelrig-scenario/1\"");
+  fields.require_only("the file", {"format", "name", "start", "tunnel", "score_from_s", "segments"});
   Scenario scenario{.name = fields.text("name"), .tunnel = fields.text("tunnel")};
   if (scenario.name.empty()) scenario.name = file;
   const toml::array* segments = document["segments"].as_array();

@@ -90,6 +90,12 @@ TEST_F(Scenarios, BadOnesAreRefusedWithTheRule) {
                       "rate_rad_s = 1\nturns = 1\n"),
               HasSubstr("the one before ends at"));
   EXPECT_THAT(refusal("segments = 3\n"), HasSubstr("no [[segments]]"));
+  EXPECT_THAT(refusal("start = [0, 0.5]\ntunel = \"2.4\"\n" + hold),
+              HasSubstr("s.toml:3: the file: tunel is no key here; known are format, name, start, tunnel"));
+  EXPECT_THAT(refusal("start = [0, 0.5]\n" + hold +
+                      "[[segments]]\nkind = \"move\"\nto = [0, 0.6]\nacceleration_m_s2 = 1\nspeed_ms = 1\n"),
+              HasSubstr("move: speed_ms is no key here"));
+  EXPECT_THAT(refusal("start = [0, 0.5]\n" + hold + "to = [0, 1]\n"), HasSubstr("hold: to is no key here"));
 }
 
 TEST_F(Scenarios, AVehicleWiderThanTheTunnelIsRefused) {
