@@ -236,7 +236,8 @@ void add_fly(CLI::App& app, Work& work) {
                    "Undeclared: gusts along the tunnel, standard deviation");
   verb->add_option("--motor-loss", options->hidden.motor_loss,
                    "Undeclared: share of its thrust that a rotor lost");
-  verb->add_option("--weak-rotor", options->hidden.weak_rotor, "Which rotor that is, 1 to 4");
+  verb->add_option("--weak-rotor", options->hidden.weak_rotor,
+                   "Which rotor that is, 1 to 4, numbered as the rig's");
   verb->callback([options, &work] { work = [options] { return run_fly(*options); }; });
 }
 

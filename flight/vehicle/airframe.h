@@ -49,10 +49,11 @@ struct Airframe {
   void validate() const;
 };
 
-/// Rotors 1 to 4: 1 and 4 are the right pair, 2 and 3 the left, 1 and 2 stand at positive x; 1 and 3 turn the
-/// same way.
-inline constexpr std::array<double, kRotors> kRotorX = {1, 1, -1, -1};
+/// Rotors 1 to 4 as the rig's (docs/campaign-folder.md): 1 front right, 2 rear left, 3 front left, 4 rear
+/// right. The front is away from the viewer, at negative x. The sign of the moment about z: 1 and 2 turn
+/// counter-clockwise.
+inline constexpr std::array<double, kRotors> kRotorX = {-1, 1, -1, 1};
 inline constexpr std::array<double, kRotors> kRotorY = {1, -1, -1, 1};
-inline constexpr std::array<double, kRotors> kRotorSpin = {1, -1, 1, -1};
+inline constexpr std::array<double, kRotors> kRotorSpin = {-1, -1, 1, 1};
 
 }  // namespace tunnelrig

@@ -46,11 +46,11 @@ RotorLoads Motors::loads(const PerRotor& speed, const PerRotor& factor) const {
   for (std::size_t i = 0; i < kRotors; ++i) thrust[i] = per_speed2_ * speed[i] * speed[i] * factor[i];
   // Pairs first: mirrored rotors then give exactly mirrored moments.
   const double right = thrust[0] + thrust[3], left = thrust[1] + thrust[2];
-  const double front = thrust[0] + thrust[1], back = thrust[2] + thrust[3];
-  const double one_way = thrust[0] + thrust[2], other_way = thrust[1] + thrust[3];
+  const double front = thrust[0] + thrust[2], rear = thrust[1] + thrust[3];
+  const double clockwise = thrust[2] + thrust[3], counter_clockwise = thrust[0] + thrust[1];
   return {right + left,
-          {offset_m_ * (right - left), offset_m_ * (back - front),
-           torque_over_thrust_m_ * (one_way - other_way)}};
+          {offset_m_ * (right - left), offset_m_ * (front - rear),
+           torque_over_thrust_m_ * (clockwise - counter_clockwise)}};
 }
 
 }  // namespace tunnelrig

@@ -121,6 +121,48 @@ TEST(Motors, FollowAStepWithTheirLagAndStopAtTheirLimits) {
   EXPECT_NEAR(motors.speed_rad_s()[0], frame.largest_speed_rad_s(), 1e-6);
 }
 
+/// docs/campaign-folder.md: 1 front right, 2 rear left, 3 front left, 4 rear right; 1 and 2 turn
+/// counter-clockwise.
+TEST(Motors, RotorsAreNumberedAsTheRigs) {
+  const Airframe frame;
+  const auto moment_without = [&](std::size_t weak) {
+    Motors motors(frame, kStep_s);
+    motors.settle(5);
+    PerRotor factor = {1, 1, 1, 1};
+    factor[weak - 1] = 0.9;
+    return motors.advance(factor)[0].moment_N_m;
+  };
+  const double lever_N_m = 0.5 * frame.rotor_offset_m(), turn_N_m = 0.5 * frame.torque_over_thrust_m;
+  // x towards the viewer, who stands behind the vehicle; y right, z up.
+  const auto expect = [&](std::size_t weak, double right, double front, double counter_clockwise) {
+    SCOPED_TRACE(weak);
+    const auto moment = moment_without(weak);
+    EXPECT_NEAR(moment[0], -right * lever_N_m, 1e-12);
+    EXPECT_NEAR(moment[1], -front * lever_N_m, 1e-12);
+    EXPECT_NEAR(moment[2], counter_clockwise * turn_N_m, 1e-12) << "its torque on the body was the other way";
+  };
+  expect(1, 1, 1, 1);
+  expect(2, -1, -1, 1);
+  expect(3, -1, 1, -1);
+  expect(4, 1, -1, -1);
+}
+
+/// Each axis of the mixer acts on its own axis of the motors, with its sign.
+TEST(AttitudeLoop, MixesAsTheMotorsStand) {
+  const Airframe frame;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Motors motors(frame, kStep_s);
+    motors.settle(5);
+    AttitudeSense sense;
+    sense.rate_rad_s[axis] = -0.2;  // it is asked to turn the other way
+    motors.command(AttitudeLoop(frame, {}, 3 * kStep_s).step({0, 0, kGravity_m_s2, 0}, sense));
+    const auto moment = motors.advance({1, 1, 1, 1})[2].moment_N_m;
+    EXPECT_GT(moment[axis], 0) << axis;
+    EXPECT_NEAR(moment[(axis + 1) % 3], 0, 1e-9);
+    EXPECT_NEAR(moment[(axis + 2) % 3], 0, 1e-9);
+  }
+}
+
 TEST(Motors, ThrustOfTheRigIsItsCoefficient) {
   // (4.18) with one disc as the area: 7.4 N per rotor at 5000 rev/min and C_T 0.1056.
   Airframe frame;
