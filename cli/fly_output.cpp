@@ -28,18 +28,30 @@ std::string contacts_text(const Comparison& c) {
 
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
+/// For the JSON, which has no infinity.
+nlohmann::ordered_json error_mm(double error_m) {
+  return std::isfinite(error_m) ? nlohmann::ordered_json(rounded(kMm * error_m)) : nlohmann::ordered_json();
+}
+
+/// For a table; infinite is the error of a controller that lost a flight.
+std::string error_text(double error_m, int decimals) {
+  return std::isfinite(error_m) ? fmt::format("{:.{}f}", kMm * error_m, decimals) : "lost";
+}
+
 nlohmann::ordered_json controller_json(const Comparison& c) {
   nlohmann::ordered_json json{{"name", c.controller},
                               {"runs", c.runs.size()},
-                              {"rms_y_mm", rounded(kMm * c.rms_y_m)},
-                              {"rms_z_mm", rounded(kMm * c.rms_z_m)},
-                              {"max_y_mm", rounded(kMm * c.largest_y_m)},
-                              {"max_z_mm", rounded(kMm * c.largest_z_m)},
-                              {"ci95_rms_mm", {rounded(kMm * c.ci95_low_m), rounded(kMm * c.ci95_high_m)}},
+                              {"lost", c.lost},
+                              {"rms_y_mm", error_mm(c.rms_y_m)},
+                              {"rms_z_mm", error_mm(c.rms_z_m)},
+                              {"max_y_mm", error_mm(c.largest_y_m)},
+                              {"max_z_mm", error_mm(c.largest_z_m)},
+                              {"ci95_rms_mm", nullptr},
                               {"contacts", c.contacts},
                               {"first_contact_s", nullptr},
                               {"estimator_rms_mm", rounded(kMm * c.estimator_rms_m)},
                               {"thrust_saturated_s", rounded(c.saturated_s)}};
+  if (c.lost == 0) json["ci95_rms_mm"] = {error_mm(c.ci95_low_m), error_mm(c.ci95_high_m)};
   if (c.first_contact_s) json["first_contact_s"] = rounded(*c.first_contact_s);
   return json;
 }
@@ -143,13 +155,15 @@ void print_flown(const FlownScenario& flown) {
                "p95 z [mm]", "mean rms, 95 % [mm]", "effort [N]", "saturated [s]", "estimator [mm]", "NEES/4",
                "contacts"});
   for (const Comparison& c : flown.controllers) {
-    const auto mm = [](double m) { return fmt::format("{:.1f}", kMm * m); };
-    table.add(
-        {c.controller, mm(c.rms_y_m), mm(c.rms_z_m), mm(c.largest_y_m), mm(c.largest_z_m), mm(c.p95_y_m),
-         mm(c.p95_z_m), fmt::format("{:.1f} to {:.1f}", kMm * c.ci95_low_m, kMm * c.ci95_high_m),
-         fmt::format("{:.2f}", c.effort_N), fmt::format("{:.2f}", c.saturated_s),
-         fmt::format("{:.1f}", kMm * c.estimator_rms_m), c.nees > 0 ? fmt::format("{:.2f}", c.nees / 4) : "-",
-         contacts_text(c) + (c.lost > 0 ? fmt::format("; {} lost", c.lost) : "")});
+    const auto mm = [](double m) { return error_text(m, 1); };
+    table.add({c.controller, mm(c.rms_y_m), mm(c.rms_z_m), mm(c.largest_y_m), mm(c.largest_z_m),
+               mm(c.p95_y_m), mm(c.p95_z_m),
+               c.lost > 0 ? "lost" : fmt::format("{:.1f} to {:.1f}", kMm * c.ci95_low_m, kMm * c.ci95_high_m),
+               fmt::format("{:.2f}", c.effort_N), fmt::format("{:.2f}", c.saturated_s),
+               fmt::format("{:.1f}", kMm * c.estimator_rms_m),
+               c.nees > 0 ? fmt::format("{:.2f}", c.nees / 4) : "-",
+               contacts_text(c) +
+                   (c.lost > 0 ? fmt::format("; {} of {} flights lost", c.lost, c.runs.size()) : "")});
   }
   table.print();
   double outside_s = 0;
@@ -177,8 +191,8 @@ void print_beside_thesis(const std::vector<FlownScenario>& flown) {
       for (const Comparison& c : one.controllers) {
         if (c.controller != printed.controller) continue;
         table.add({one.tunnel, one.scenario, c.controller, printed.result,
-                   fmt::format("{:.0f}, {:.0f}", kMm * c.largest_y_m, kMm * c.largest_z_m),
-                   fmt::format("{:.0f}, {:.0f}", kMm * c.rms_y_m, kMm * c.rms_z_m), contacts_text(c)});
+                   error_text(c.largest_y_m, 0) + ", " + error_text(c.largest_z_m, 0),
+                   error_text(c.rms_y_m, 0) + ", " + error_text(c.rms_z_m, 0), contacts_text(c)});
       }
     }
   }

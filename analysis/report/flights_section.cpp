@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 namespace tunnelrig::report {
@@ -20,6 +22,12 @@ bool are_numbers(const Json& values) {
 bool is_path(const Json& path) {
   return path.is_object() && path.contains("y_m") && path.contains("z_m") && are_numbers(path["y_m"]) &&
          are_numbers(path["z_m"]) && path["y_m"].size() == path["z_m"].size() && !path["y_m"].empty();
+}
+
+/// Its errors are null then.
+bool has_lost(const Json& controller) {
+  const Json lost = controller.value("lost", Json());
+  return lost.is_number() && lost.get<double>() > 0;
 }
 
 /// What the page's script relies on, so that it need not look.
@@ -39,9 +47,11 @@ std::string wrong_with(const Json& flight) {
   for (const Json& controller : flight["controllers"]) {
     if (!controller.is_object() || !controller.contains("name") || !controller["name"].is_string())
       return "has a controller without name";
-    for (const char* key : {"runs", "rms_y_mm", "rms_z_mm", "max_y_mm", "max_z_mm", "contacts",
-                            "estimator_rms_mm", "thrust_saturated_s"})
+    for (const char* key : {"runs", "contacts", "estimator_rms_mm", "thrust_saturated_s"})
       if (!controller.contains(key) || !controller[key].is_number())
+        return fmt::format("has a controller without {}", key);
+    for (const char* key : {"rms_y_mm", "rms_z_mm", "max_y_mm", "max_z_mm"})
+      if (!controller.contains(key) || !(controller[key].is_number() || has_lost(controller)))
         return fmt::format("has a controller without {}", key);
     if (!controller.contains("path") || !is_path(controller["path"]) ||
         controller["path"]["y_m"].size() > flight["reference"]["y_m"].size())
@@ -55,12 +65,13 @@ std::string wrong_with(const Json& flight) {
 namespace {
 
 double error_mm(const Json& controller) {
+  if (has_lost(controller)) return std::numeric_limits<double>::infinity();
   return std::hypot(controller["rms_y_mm"].get<double>(), controller["rms_z_mm"].get<double>());
 }
 
-/// Fewer contacts are better, then smaller errors.
-std::pair<double, double> flight_rank(const Json& controller) {
-  return {controller["contacts"].get<double>(), error_mm(controller)};
+/// A flight that was lost is worst, fewer contacts are better, then smaller errors.
+std::tuple<bool, double, double> flight_rank(const Json& controller) {
+  return {has_lost(controller), controller["contacts"].get<double>(), error_mm(controller)};
 }
 
 std::optional<std::pair<double, double>> interval_mm(const Json& controller) {
@@ -90,6 +101,7 @@ const Json* controller_in(const Json& flight, const Json& name) {
 
 Json best_of_one(const Json& flight) {
   const Json& best = best_of(flight);
+  if (has_lost(best)) return nullptr;
   const auto interval = interval_mm(best);
   Json json{{"scenario", flight["scenario"]}, {"tunnel", flight["tunnel"]}, {"name", best["name"]},
             {"contacts", best["contacts"]},   {"rms_mm", error_mm(best)},   {"ci95_mm", nullptr},
@@ -109,7 +121,7 @@ Json best_of_all(const Json& flights) {
     int flown = 0, first_in = 0;
     for (const Json& flight : flights) {
       const Json* controller = controller_in(flight, candidate["name"]);
-      if (controller == nullptr) break;
+      if (controller == nullptr || has_lost(*controller)) break;
       ++flown;
       contacts += (*controller)["contacts"].get<double>();
       squares += error_mm(*controller) * error_mm(*controller);

@@ -6,11 +6,14 @@
 #include <atomic>
 #include <cmath>
 #include <exception>
+#include <limits>
 #include <mutex>
 #include <thread>
 
 namespace tunnelrig {
 namespace {
+
+constexpr double kLostError_m = std::numeric_limits<double>::infinity();
 
 /// 97.5 % point of Student's t, within 1 % from three degrees of freedom on (Cornish and Fisher's expansion).
 double student_975(int degrees) {
@@ -84,8 +87,9 @@ class Worker {
   std::optional<Localisation> localisation_;
 };
 
+/// A flight that was lost has no error: what was flown up to there would flatter it.
 RunResult result_of(const FlightScore& score) {
-  return {
+  RunResult run{
       .rms_y_m = score.tracking[0].rms_m(),
       .rms_z_m = score.tracking[1].rms_m(),
       .largest_y_m = score.tracking[0].largest_m(),
@@ -100,6 +104,8 @@ RunResult result_of(const FlightScore& score) {
       .rejected_matches = score.rejected_matches,
       .lost = score.lost,
       .touched = score.contacts};
+  if (score.lost) run.rms_y_m = run.rms_z_m = run.largest_y_m = run.largest_z_m = kLostError_m;
+  return run;
 }
 
 void summarise(Comparison& all) {
@@ -125,7 +131,8 @@ void summarise(Comparison& all) {
       all.first_contact_s = run.touched[0].time_s;
   }
   for (const RunResult& run : all.runs) squares += (run.rms_m() - mean) * (run.rms_m() - mean);
-  const double half = n > 1 ? student_975(static_cast<int>(n) - 1) * std::sqrt(squares / (n - 1) / n) : 0;
+  const double half =
+      n > 1 && all.lost == 0 ? student_975(static_cast<int>(n) - 1) * std::sqrt(squares / (n - 1) / n) : 0;
   all.rms_y_m = std::sqrt(y2);
   all.rms_z_m = std::sqrt(z2);
   all.estimator_rms_m = std::sqrt(e2);
@@ -192,9 +199,9 @@ Comparison fly_runs(const FlightTask& task, std::string_view controller, const G
   for (std::thread& thread : threads) thread.join();
   if (failed) std::rethrow_exception(failed);
   if (task.processes != nullptr) exchange_runs(*task.processes, all.runs, pooled);
-  all.p95_y_m = pooled[0].quantile_m(0.95);
-  all.p95_z_m = pooled[1].quantile_m(0.95);
   summarise(all);
+  all.p95_y_m = all.lost > 0 ? kLostError_m : pooled[0].quantile_m(0.95);
+  all.p95_z_m = all.lost > 0 ? kLostError_m : pooled[1].quantile_m(0.95);
   return all;
 }
 

@@ -54,6 +54,7 @@ struct FlightTask {
   std::uint64_t seed = 1;
 };
 
+/// One flight. Where it was lost its errors are infinite.
 struct RunResult {
   double rms_y_m = 0, rms_z_m = 0, largest_y_m = 0, largest_z_m = 0;
   double estimator_rms_m = 0, nees = 0, effort_N = 0, saturated_s = 0, clamped_s = 0;
@@ -64,6 +65,7 @@ struct RunResult {
   double rms_m() const;  // √(rms_y² + rms_z²)
 };
 
+/// All flights of a controller. Where one was lost the errors are infinite: over all runs there is no bound.
 struct Comparison {
   std::string controller;
   std::vector<RunResult> runs;

@@ -54,9 +54,10 @@ void expect_contract(const json& object) {
   EXPECT_EQ(object.size(), 6U);
   ASSERT_FALSE(object.at("controllers").empty());
   for (const json& one : object["controllers"]) {
-    EXPECT_EQ(one.size(), 11U);
+    EXPECT_EQ(one.size(), 12U);
     EXPECT_TRUE(one.at("name").is_string());
-    for (const char* count : {"runs", "contacts"}) EXPECT_TRUE(one.at(count).is_number_integer()) << count;
+    for (const char* count : {"runs", "lost", "contacts"})
+      EXPECT_TRUE(one.at(count).is_number_integer()) << count;
     for (const char* number :
          {"rms_y_mm", "rms_z_mm", "max_y_mm", "max_z_mm", "estimator_rms_mm", "thrust_saturated_s"}) {
       EXPECT_TRUE(one.at(number).is_number()) << number;
@@ -86,6 +87,19 @@ TEST_F(Fly, JsonIsTheContract) {
   EXPECT_EQ(object["controllers"].size(), 2U);
   EXPECT_EQ(object["controllers"][1]["name"], "ibs-map");
   EXPECT_EQ(object["controllers"][0]["runs"], 3);
+}
+
+TEST_F(Fly, SaysThatAFlightWasLost) {
+  write_text(folder / "wild.toml",
+             "format = \"tunnelrig-gains/1\"\n[indi]\nposition_y = 40\nvelocity_y = 0.5\nposition_z = 80\n"
+             "velocity_z = 0.5\nfilter_Hz = 20\nlead_s = 0.6\n");
+  const std::string crash =
+      "--scenario circle --controllers indi --runs 3 --motor-loss 0.3 --map-scale 5 --gains wild.toml";
+  const json one = flown(crash)["controllers"][0];
+  ASSERT_GT(one["lost"], 0);
+  for (const char* error : {"rms_y_mm", "rms_z_mm", "max_y_mm", "max_z_mm", "ci95_rms_mm"})
+    EXPECT_TRUE(one.at(error).is_null()) << error;
+  EXPECT_THAT(run(crash).out, HasSubstr(" of 3 flights lost"));
 }
 
 TEST_F(Fly, IsTheSameToTheByteForASeedWhateverTheNumberOfThreads) {

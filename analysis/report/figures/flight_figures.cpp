@@ -98,15 +98,17 @@ Figure errors_figure(const Json& flight, const std::string& name, double width_m
   for (std::size_t i = 0; i < controllers.size(); ++i) {
     const Json& one = controllers[i];
     const double y = static_cast<double>(controllers.size() - 1 - i);
-    const double rms = std::hypot(one["rms_y_mm"].get<double>(), one["rms_z_mm"].get<double>());
+    const bool lost = one["rms_y_mm"].is_null();  // a flight: no error, and no point
+    const double rms = lost ? NAN : std::hypot(one["rms_y_mm"].get<double>(), one["rms_z_mm"].get<double>());
     const Json interval = one.value("ci95_rms_mm", Json());
     const bool known =
         interval.is_array() && interval.size() == 2 && interval[0].is_number() && interval[1].is_number();
     const double low = known ? interval[0].get<double>() : NAN,
                  high = known ? interval[1].get<double>() : NAN;
     auto& rows = one["contacts"].get<double>() > 0 ? touched : clean;
-    rows.push_back({known ? 0.5 * (low + high) : rms, y, known ? low : rms, known ? high : rms});
-    tics += fmt::format("{}{} {}", i == 0 ? "" : ", ", gnuplot_text(one["name"].get<std::string>()), y);
+    if (!lost) rows.push_back({known ? 0.5 * (low + high) : rms, y, known ? low : rms, known ? high : rms});
+    tics += fmt::format("{}{} {}", i == 0 ? "" : ", ",
+                        gnuplot_text(one["name"].get<std::string>() + (lost ? " (lost)" : "")), y);
   }
   constexpr double kLeft_mm = 24, kRow_mm = 4.2;
   const double plot_mm = kRow_mm * (static_cast<double>(controllers.size()) + 0.4);

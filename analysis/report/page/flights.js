@@ -54,6 +54,7 @@ function flightTable({controllers}) {
   return table('Errors over all runs, contacts, estimator', [
     {name: 'controller', cell: (row) => row.name, text: true},
     {name: 'runs', cell: (row) => String(row.runs)},
+    {name: 'lost', cell: (row) => String(row.lost ?? 0)},
     {name: 'rms y [mm]', cell: mm('rms_y_mm')},
     {name: 'rms z [mm]', cell: mm('rms_z_mm')},
     {name: 'mean rms, 95 % [mm]', cell: ({ci95_rms_mm: ci}) => (ci ? `${fixed(ci[0], 1)} to ${fixed(ci[1], 1)}` : '–')},

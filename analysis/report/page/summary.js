@@ -57,7 +57,7 @@ function modelInForce({model}) {
 const contactsOf = (n) => (n ? counted(n, 'contact') : 'no contact');
 
 function bestController({flown}) {
-  if (!flown) return flown === null ? 'No controller flew all scenarios, so none is the best.' : '';
+  if (!flown) return flown === null ? 'No controller came through all scenarios, so none is the best.' : '';
   const {scenarios, controllers, name, rms_mm: rms, contacts} = flown;
   const among = `Of ${counted(controllers, 'controller')}, flown in simulation through`;
   if (scenarios > 1) {

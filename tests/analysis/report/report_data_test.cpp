@@ -333,6 +333,18 @@ TEST_F(BestController, TouchesNothingAndErrsLeast) {
   EXPECT_EQ(one["controllers"], 4);
 }
 
+TEST_F(BestController, HasLostNoFlight) {
+  Json crashed = flight("hover", {{"crashed", 1, 0}, {"ibs", 10, 3}});
+  Json& one = crashed["controllers"][0];
+  one["lost"] = 1;
+  for (const char* error : {"rms_y_mm", "rms_z_mm", "max_y_mm", "max_z_mm", "ci95_rms_mm"})
+    one[error] = nullptr;
+  EXPECT_EQ(best({crashed})["name"], "ibs");
+  EXPECT_EQ(best({crashed, flight("circle", {{"crashed", 1, 0}, {"ibs", 10, 0}})})["name"], "ibs");
+  crashed["controllers"].erase(1);
+  EXPECT_TRUE(best({crashed}).is_null());
+}
+
 TEST_F(BestController, IsJudgedOverAllScenarios) {
   const Json both = best({flight("hover", {{"a", 10, 0}, {"b", 20, 0}, {"only", 1, 0}}),
                           flight("circle", {{"a", 40, 0}, {"b", 20, 0}})});

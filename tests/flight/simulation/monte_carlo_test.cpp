@@ -91,6 +91,17 @@ TEST_F(MonteCarlo, TheEstimatorIsConsistentInFlight) {
   }
 }
 
+TEST_F(MonteCarlo, AFlightThatIsLostHasNoError) {
+  FlightTask flight = task(4, 1);
+  flight.localisation = {};
+  flight.spread.roll_error_rad = 3;  // an attitude that is wrong by this much turns the vehicle over
+  const Comparison crashed = fly_runs(flight, "ibs", frozen_gains());
+  ASSERT_GT(crashed.lost, 0);
+  for (const double error_m : {crashed.rms_y_m, crashed.rms_z_m, crashed.largest_y_m, crashed.largest_z_m,
+                               crashed.p95_y_m, crashed.p95_z_m, crashed.ci95_low_m, crashed.ci95_high_m})
+    EXPECT_TRUE(std::isinf(error_m)) << error_m;
+}
+
 TEST_F(MonteCarlo, UnknownControllersAndTruthsAreRefused) {
   EXPECT_THROW(fly_runs(task(2, 2), "lqr", frozen_gains()), InputError);
   EXPECT_THROW((HiddenTruth{.payload_kg = -1}.validate()), InputError);
