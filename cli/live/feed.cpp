@@ -159,7 +159,7 @@ void LiveFeed::tick(Time time) {
   const bool watched = viewers_.count() > 0;
   if (time >= next_spectrum_ && view_ && view_->window.full() && now.position.phase == Phase::kRecording) {
     next_spectrum_ = time + kSpectrum;
-    send_spectrum(scale);
+    send_spectrum(scale, now.position.run.speed_rpm);
   }
   const std::pair standing(now.position.phase, now.position.run.run);
   if (time < next_state_ && standing == told_) return;
@@ -213,8 +213,8 @@ void LiveFeed::send_frames(const Scale& scale, bool all) {
   viewers_.show("frames", {out.data(), out.size()});
 }
 
-void LiveFeed::send_spectrum(const Scale& scale) {
-  const LiveSpectrum spectrum = live_spectrum(view_->window, scale, info_);
+void LiveFeed::send_spectrum(const Scale& scale, std::optional<double> speed_rpm) {
+  const LiveSpectrum spectrum = live_spectrum(view_->window, scale, at_speed(info_, speed_rpm));
   shaft_hz_ = spectrum.shaft_hz;
   if (viewers_.count() == 0) return;
   const double t_s = static_cast<double>(view_->window.frames().back().index) / info_.daq.sample_rate_hz;

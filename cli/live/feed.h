@@ -101,7 +101,7 @@ class LiveFeed {
   void tick(Time now);
   void take_frames(const Shared& now);
   void send_frames(const Scale& scale, bool all);
-  void send_spectrum(const Scale& scale);
+  void send_spectrum(const Scale& scale, std::optional<double> speed_rpm);
   void check(const Shared& now, const Scale& scale, Time time);
   void check_channels(const Shared& now, const Scale& scale, Time time);
   static std::optional<double> tare_age_s(const Shared& now);

@@ -27,7 +27,8 @@ struct LiveSpectrum {
 /// Frames that a spectrum takes: three half-overlapped Hann windows of 2048.
 inline constexpr std::size_t kSpectrumFrames = 4096;
 
-/// `frames` is full. Lines are marked by the shaft that is seen, else by the nominal speed.
+/// `frames` is full. The shaft is looked for at the nominal speed of `info` (the run's own: `at_speed`);
+/// lines are marked by the shaft that is seen, else by that speed.
 LiveSpectrum live_spectrum(const FrameWindow& frames, const Scale& scale, const CampaignInfo& info);
 
 /// "{"t_s":…,"df_hz":…,…}" as the page reads it.

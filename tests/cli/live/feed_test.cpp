@@ -9,6 +9,8 @@
 #include "daq/virtual_rig.h"
 #include "support/message_of.h"
 
+#include <cmath>
+#include <numbers>
 #include <set>
 #include <thread>
 
@@ -112,6 +114,25 @@ TEST_F(Watched, TracesComeTwentyTimesASecondAndHideNothing) {
   EXPECT_EQ(spectra, 1u);
   EXPECT_NEAR(low, outcome.statistics.channels[2].lowest_V, 1e-4);
   EXPECT_NEAR(high, outcome.statistics.channels[2].highest_V, 1e-4);
+}
+
+TEST_F(Watched, TheShaftIsLookedForAtTheRunsOwnSpeed) {
+  LiveRun run{.run = "R1", .location = "OT", .session = "S1", .duration_s = 5};
+  run.speed_rpm = 3300;
+  VirtualBoard board({.frame_rate_hz = 4000.0 / 3, .pace = 1}, [n = 0]() mutable {
+    const double turns = 55.0 * 3 / 4000 * ++n;
+    const auto sample =
+        static_cast<std::int16_t>(2000 + 200 * std::sin(2 * std::numbers::pi * turns) + n * 7 % 5);
+    return trw_frame{.sample = {sample, sample, sample, sample}, .status = 0};
+  });
+  test::EventStream stream(port());
+  record(board, run);
+  const auto text = stream.next("spectrum");
+  ASSERT_TRUE(text);
+  const json spectrum = json::parse(*text);
+  EXPECT_EQ(spectrum["lines"][0]["name"], "shaft");
+  EXPECT_NEAR(spectrum["lines"][0]["frequency_hz"].get<double>(), 55, 0.5)
+      << "83 Hz is the rig's nominal speed";
 }
 
 TEST_F(Watched, StateTellsMeansAndLosses) {
