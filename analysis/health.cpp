@@ -17,7 +17,6 @@ constexpr double kMuchLost = 0.01;         // share of a run's frames
 constexpr double kSpeedTolerance = 0.003;  // of the nominal speed, the thesis's ±15 rev/min
 constexpr double kTachometerAgrees = 0.005;  // shaft line against tachometer
 constexpr double kRateAgrees = 1e-3;         // board's clock against campaign.toml
-constexpr double kDeadNoise_counts = 0.25;   // a channel that shows less noise than the converter itself
 
 /// Collects names and says them in a sentence's length.
 class Names {

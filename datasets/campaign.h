@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace tunnelrig {
@@ -124,6 +125,9 @@ struct Run {
 
 /// The same campaign at the speed that a run was measured at, where it was: its shaft is looked for there.
 CampaignInfo at_speed(CampaignInfo campaign, std::optional<double> measured_rpm);
+
+/// Lowest and highest value that a column of runs.csv can hold, where its unit fixes them.
+std::optional<std::pair<double, double>> range_of(std::string_view column);
 
 /// Why a column of runs.csv cannot hold a value, in words: its range, and the unit that is meant. Empty where
 /// it can; any number can stand in a column that the suite does not know.

@@ -17,6 +17,9 @@ struct SpectralLine {
   std::string name;        // "shaft", "blade_pass", "mains_50", …; empty where nothing is known of it
 };
 
+/// Less noise than this and a channel is dead: the converter itself makes more.
+inline constexpr double kDeadNoise_counts = 0.25;
+
 /// One channel of one run, in volts.
 struct ChannelStatistics {
   double mean_V = 0;

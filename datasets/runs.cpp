@@ -228,6 +228,12 @@ CampaignInfo at_speed(CampaignInfo campaign, std::optional<double> measured_rpm)
   return campaign;
 }
 
+std::optional<std::pair<double, double>> range_of(std::string_view column) {
+  const KnownColumn* known = known_column(column);
+  if (known == nullptr) return {};
+  return std::pair(known->lowest, known->highest);
+}
+
 std::string outside_range(std::string_view column, double value) {
   const KnownColumn* known = known_column(column);
   if (known == nullptr || (value >= known->lowest && value <= known->highest)) return "";

@@ -1,5 +1,6 @@
 #include "cli/live/command.h"
 
+#include "datasets/campaign.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -90,11 +91,10 @@ std::map<std::string, std::optional<double>> metadata_values(const Object& objec
     const auto* field =
         std::find_if(kMetadata.begin(), kMetadata.end(), [&](const auto& f) { return name == f.name; });
     if (field == kMetadata.end()) throw InputError("metadata: there is no quantity of this name");
-    if (value.is_null())
-      values[name] = std::nullopt;
-    else
-      values[name] =
-          Reader::in_range(fmt::format("{} [{}]", field->label, field->unit), value, field->low, field->high);
+    values[name] = std::nullopt;
+    if (value.is_null()) continue;
+    const auto [low, high] = range_of(name).value();
+    values[name] = Reader::in_range(fmt::format("{} [{}]", field->label, field->unit), value, low, high);
   }
   return values;
 }

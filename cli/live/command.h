@@ -31,19 +31,18 @@ struct CommandResult {
 /// command or key, a value of the wrong type or out of its range, a label that is too long.
 Command parse_command(std::string_view body);
 
-/// A quantity that the operator reads off an instrument; a column of the sheet of runs.
+/// A quantity that the operator reads off an instrument; a column of the sheet of runs, with its range.
 struct MetadataField {
   const char* name;
   const char* label;
   const char* unit;
-  double low, high;
 };
 inline constexpr std::array<MetadataField, 6> kMetadata = {
-    {{"speed_rpm", "Rotor speed", "rev/min", 0, 200000},
-     {"air_temperature_C", "Air temperature", "°C", -80, 80},
-     {"air_pressure_Pa", "Air pressure", "Pa", 30000, 120000},
-     {"relative_humidity", "Relative humidity", "0 to 1", 0, 1},
-     {"supply_voltage_V", "Supply voltage", "V", 0, 1000},
-     {"time_since_motor_start_s", "Since the motors started", "s", 0, 1e7}}};
+    {{"speed_rpm", "Rotor speed", "rev/min"},
+     {"air_temperature_C", "Air temperature", "°C"},
+     {"air_pressure_Pa", "Air pressure", "Pa"},
+     {"relative_humidity", "Relative humidity", "0 to 1"},
+     {"supply_voltage_V", "Supply voltage", "V"},
+     {"time_since_motor_start_s", "Since the motors started", "s"}}};
 
 }  // namespace tunnelrig::live

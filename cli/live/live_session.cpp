@@ -1,6 +1,7 @@
 #include "cli/live/live_session.h"
 
 #include "cli/live/page/page.h"
+#include "datasets/campaign.h"
 #include "datasets/error.h"
 #include "datasets/recorder_lock.h"
 
@@ -73,12 +74,13 @@ void LiveSession::say_hello() {
   for (const auto& [name, value] : desk_->metadata()) values[name] = value;
   for (const MetadataField& field : kMetadata) {
     const auto found = values.find(field.name);
+    const auto [low, high] = range_of(field.name).value();
     const bool known = found != values.end() && found->second;
     json["metadata"].push_back({{"name", field.name},
                                 {"label", field.label},
                                 {"unit", field.unit},
-                                {"low", field.low},
-                                {"high", field.high},
+                                {"low", low},
+                                {"high", high},
                                 {"value", known ? Json(*found->second) : Json(nullptr)}});
   }
   viewers_.tell("hello", json.dump(-1, ' ', false, Json::error_handler_t::replace));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "daq/live/frame_ring.h"
+#include "datasets/run_statistics.h"
 
 #include <array>
 #include <cstdint>
@@ -15,8 +16,7 @@ struct ChannelSecond {
   std::uint64_t clipped = 0;  // samples at an end of the converter's range
 
   bool stuck() const { return low == high; }
-  /// Less noise than the converter itself makes.
-  bool dead() const { return !stuck() && std < 0.25; }
+  bool dead() const { return !stuck() && std < kDeadNoise_counts; }
 };
 
 class ChannelWatch {
