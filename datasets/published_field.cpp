@@ -49,20 +49,6 @@ double published_ceiling_ratio(double distance_R) {
   return 1.01 + 0.10 * std::exp(-(distance_R - 0.5) / 0.7);
 }
 
-double published_tunnel_size_ratio(double width_R) {
-  // Claim 9: 15 R slightly above 10 R, 7.5 R and 6 R below open space; 9.84 R is the measured tunnel
-  // (Table 5.1).
-  constexpr std::array<std::array<double, 2>, 6> kTable = {
-      {{5, 0.955}, {6, 0.970}, {7.5, 0.990}, {9.8425, 0.1071 / 0.1056}, {15, 1.017}, {40, 1.0}}};
-  if (width_R <= kTable.front()[0]) return kTable.front()[1];
-  for (std::size_t i = 1; i < kTable.size(); ++i) {
-    if (width_R > kTable[i][0]) continue;
-    const double t = (width_R - kTable[i - 1][0]) / (kTable[i][0] - kTable[i - 1][0]);
-    return kTable[i - 1][1] + t * (kTable[i][1] - kTable[i - 1][1]);
-  }
-  return kTable.back()[1];
-}
-
 std::array<double, 4> rotor_shares(double uneven) {
   const double right = (1 + uneven) / 4, left = (1 - uneven) / 4;
   return {right, left, left, right};

@@ -23,9 +23,6 @@ double published_ground_ratio(double distance_R);
 /// The same beneath a ceiling plane; 1.01 far away, as measured (Section 5.2.4).
 double published_ceiling_ratio(double distance_R);
 
-/// C_T at the origin of a square tunnel of this width over that in open space (Section 5.5).
-double published_tunnel_size_ratio(double width_R);
-
 /// Share of the total thrust that rotors 1 to 4 carry where the uneven thrust is `uneven`: 1 and 4 are the
 /// right pair.
 std::array<double, 4> rotor_shares(double uneven);

@@ -10,10 +10,7 @@ inline constexpr double kPressure_Pa = 101325;         // held constant, (4.17)
 inline constexpr double kCtOpenSpace = 0.1056;     // Table 5.1, experiment
 inline constexpr double kCtOpenSpaceStd = 3.5e-4;  // Section 4.2.2
 inline constexpr double kCtTunnelOrigin = 0.1071;  // Table 5.1, experiment
-inline constexpr double kCtOpenSpaceCfd = 0.1140;  // Table 5.1
-inline constexpr double kCtTunnelOriginCfd = 0.1141;
 
 inline constexpr double kCorrelationGate = 0.98;  // Section 4.2.1.1
-inline constexpr double kSpeedTolerance_rpm = 15;
 
 }  // namespace tunnelrig::thesis

@@ -166,9 +166,4 @@ std::string maps_json(const CampaignData& data, const Reduction& reduction) {
   return json.dump();
 }
 
-bool fulfils(const Run& run, const PlannedRun& planned) {
-  return run.excluded.empty() && run.session == planned.session && run.kind == planned.kind &&
-         run.location == planned.location && run.repeat == planned.repeat;
-}
-
 }  // namespace tunnelrig::live

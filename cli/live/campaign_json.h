@@ -30,7 +30,4 @@ std::string campaign_json(const CampaignStand& stand);
 /// person, where there are none yet.
 std::string maps_json(const CampaignData& data, const Reduction& reduction);
 
-/// What is recorded of a planned run: a complete one that is not excluded.
-bool fulfils(const Run& run, const PlannedRun& planned);
-
 }  // namespace tunnelrig::live

@@ -101,7 +101,6 @@ class AugmentedFilter : public DelayedFilter<AugmentedModel> {
 
   Eigen::Vector2d disturbance_m_s2() const { return state().segment<2>(4); }
   Eigen::Vector2d accelerometer_bias_m_s2() const { return state().segment<2>(6); }
-  Eigen::Vector2d disturbance_force_N(double mass_kg) const { return mass_kg * disturbance_m_s2(); }
 };
 
 }  // namespace tunnelrig

@@ -24,6 +24,7 @@ struct Course {
   }
 };
 
+/// √(mean over hover and training in the 1.5 m tunnel of rms² + (effort)² + contacts²), position given.
 double cost_m(const Course& course, std::string_view controller, const GainTable& gains,
               const DisturbanceMap& map, const TuningSettings& settings) {
   double sum = 0;
@@ -46,11 +47,6 @@ double cost_m(const Course& course, std::string_view controller, const GainTable
 }
 
 }  // namespace
-
-double tuning_cost_m(std::string_view controller, const GainTable& gains, const DisturbanceMap& map,
-                     const TuningSettings& settings) {
-  return cost_m(Course(), controller, gains, map, settings);
-}
 
 Tuned tune(std::string_view controller, const DisturbanceMap& map, const TuningSettings& settings,
            const std::function<void(int)>& progress) {

@@ -24,10 +24,6 @@ struct Tuned {
   double cost_m = 0, start_cost_m = 0;  // root of the mean of squares
 };
 
-/// √(mean over hover and training in the 1.5 m tunnel of rms² + (effort)² + contacts²), position given.
-double tuning_cost_m(std::string_view controller, const GainTable& gains, const DisturbanceMap& map,
-                     const TuningSettings& settings);
-
 /// Searches the logarithms of the controller's gains between their limits, from their defaults.
 Tuned tune(std::string_view controller, const DisturbanceMap& map, const TuningSettings& settings,
            const std::function<void(int)>& progress = {});

@@ -3,7 +3,6 @@
 #include "datasets/published_field.h"
 
 #include "datasets/locations.h"
-#include "datasets/thesis.h"
 #include "support/field_claims.h"
 
 #include <algorithm>
@@ -39,13 +38,6 @@ TEST(PublishedField, OpenSpaceNumbers) {
   }
   EXPECT_TRUE(at > 1.2 && at < 4) << "the local minimum of 4.21 is at " << at;
   EXPECT_NEAR(published_ground_ratio(6), 1, 0.003);
-}
-
-TEST(PublishedField, TunnelSize) {  // claim 9
-  EXPECT_GT(published_tunnel_size_ratio(15), published_tunnel_size_ratio(10));
-  EXPECT_LT(published_tunnel_size_ratio(7.5), 1);
-  EXPECT_LT(published_tunnel_size_ratio(6), published_tunnel_size_ratio(7.5));
-  EXPECT_NEAR(published_tunnel_size_ratio(9.8425), thesis::kCtTunnelOrigin / thesis::kCtOpenSpace, 1e-12);
 }
 
 }  // namespace

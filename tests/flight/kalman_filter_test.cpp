@@ -262,10 +262,10 @@ TEST(AugmentedFilter, IsConsistentAndFindsBiasAndForce) {
   EXPECT_LT(std::sqrt(force_error), 0.15);  // of a force that starts at 1 m/s² and walks 0.7 in a second
   EXPECT_LT(std::sqrt(bias_error), 0.05);   // of 0.1
   AugmentedFilter still({0, 0});
-  EXPECT_EQ(still.disturbance_force_N(2.3), Eigen::Vector2d(0, 0));
+  EXPECT_EQ(still.disturbance_m_s2(), Eigen::Vector2d(0, 0));
 }
 
-/// A constant push that no model knows of is measured in newtons.
+/// A constant push that no model knows of is measured.
 TEST(AugmentedFilter, MeasuresAConstantForce) {
   Random random;
   AugmentedFilter filter({0, 0});
@@ -278,7 +278,7 @@ TEST(AugmentedFilter, MeasuresAConstantForce) {
     filter.predict({{0, 0}, push_m_s2 + 0.15 * random.vector()}, kStep_s);
     if (i % 10 == 0) filter.correct(random.measured(position), kNoise, 0);
   }
-  EXPECT_LT((filter.disturbance_force_N(2.3) - 2.3 * push_m_s2).norm(), 0.4);
+  EXPECT_LT((filter.disturbance_m_s2() - push_m_s2).norm(), 0.17);
 }
 
 /// Scans with 40 mm noise, the matcher's own covariance, 400 Hz prediction and the sweep's latency.
