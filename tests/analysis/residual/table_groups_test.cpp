@@ -118,23 +118,23 @@ TEST_F(TablesTest, LargeAmplitudesOfGroupsAreThoseOfTheFormula) {
   }
 }
 
-/// What the groups' constants absorb is no part of a curve: two packs, each with an arch of its own.
+/// What the groups' constants absorb is no part of a curve: two packs, and between them no voltage.
 TEST_F(TablesTest, ACurveIsDrawnWhereGroupsShowItAndNotBetween) {
-  constexpr double kHeight_N = 0.1;
+  constexpr double kHeight_N = 0.1;  // of an arch in either pack
   std::string csv = "pack,V,y\n";
   for (int r = 0; r < 160; ++r) {
-    const double u = 2 * even(random) - 1, volts = r % 2 == 0 ? 7.4 + 0.4 * u : 11.6 + 0.4 * u;
+    const double u = 2 * even(random) - 1, volts = r % 2 == 0 ? 7.4 + 0.4 * u : 9.6 + 0.4 * u;
     csv += fmt::format("{},{},{}\n", r % 2, volts,
-                       (r % 2 == 0 ? 4 : 9) + kHeight_N * (1 - u * u) + 0.01 * scatter(random));
+                       (r % 2 == 0 ? 4 : 9) + kHeight_N * (1 - u * u) + 0.004 * scatter(random));
   }
   const Explanation e = explained(observed(csv,
-                                           "groups = [\"pack\"]\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
-                                           "scatter = \"absolute\"\n"
+                                           "groups = [\"pack\"]\n[response]\ncolumn = \"y\"\n"
+                                           "unit = \"N\"\nscatter = \"absolute\"\n"
                                            "[[covariates]]\ncolumn = \"V\"\nunit = \"1\"\n"));
   ASSERT_EQ(e.unknown.size(), 1u);
-  EXPECT_NEAR(e.unknown[0].amplitude, kHeight_N / 2, 0.4 * kHeight_N / 2);
+  EXPECT_NEAR(e.unknown[0].amplitude, kHeight_N / 2, 0.5 * kHeight_N / 2);
   for (const ShapePoint& point : e.unknown[0].shape) {
-    EXPECT_TRUE(point.x < 7.9 || point.x > 11.1) << point.x;
+    EXPECT_TRUE(point.x < 7.81 || point.x > 9.19) << point.x;
     EXPECT_LT(std::abs(point.y), kHeight_N);
   }
 }
