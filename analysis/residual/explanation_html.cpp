@@ -235,8 +235,9 @@ class Page {
     if (unknown.covariate == "session") {
       MatrixXd block(observations_.rows(), 1);
       for (const int row : rows_) block(row, 0) = observations_.block[static_cast<std::size_t>(row)] + 1;
-      list.push_back(
-          panel("unknown: session", "session", block, -1, MatrixXd::Zero(after_.rows(), after_.cols())));
+      const std::string rotor = unknown.rotor < 0 ? "" : fmt::format(" of rotor {}", unknown.rotor + 1);
+      list.push_back(panel("unknown: session" + rotor, "session", block, unknown.rotor,
+                           MatrixXd::Zero(after_.rows(), after_.cols())));
     }
   }
 

@@ -3,6 +3,7 @@
 #include "analysis/residual/alike.h"
 #include "analysis/residual/session_directions.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -17,6 +18,21 @@ using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
+/// How a stratum's directions split, if one of them has a session variance of its own.
+struct Split {
+  double gain = 0;  // of the log-likelihood over alike sessions
+  std::size_t own = 0, others = 0;
+  double variance = 0;  // of runs
+};
+
+/// A rotor whose sessions differ more.
+struct Unlike {
+  Index rotor = 0;
+  VectorXd direction;  // of an offset of it, among the differences
+  double share = 1;    // of such an offset, squared: what is among the directions still alike
+  Split split;
+};
+
 /// The rotors' differences, as one stratum of alike sessions has them: which of its directions is likelier
 /// with a session variance of its own.
 class Differences {
@@ -24,7 +40,22 @@ class Differences {
   Differences(const MixedModel& model, std::size_t stratum)
       : model_(model), stratum_(stratum), sessions_(model, stratum) {}
 
-  /// One data set, in a basis (modes × k) of those directions that are still alike.
+  /// Of the rotors that are not `found`, in a data set; `alike`: basis of the directions still alike.
+  Unlike most_unlike(const Stacked& set, const MatrixXd& alike, const std::vector<Unlike>& found) const {
+    const Data in_basis = data(set, alike);
+    Unlike most{.split = {.gain = -1}};
+    for (Index rotor = 0; rotor < model_.mode_matrix().rows(); ++rotor) {
+      if (std::ranges::any_of(found, [&](const Unlike& u) { return u.rotor == rotor; })) continue;
+      const VectorXd offset =
+          alike.transpose() * model_.mode_matrix().row(rotor).tail(alike.rows()).transpose();
+      const Split own = split(in_basis, offset.normalized());
+      if (own.gain > most.split.gain) most = {rotor, alike * offset.normalized(), offset.squaredNorm(), own};
+    }
+    return most;
+  }
+
+ private:
+  /// One data set, in a basis (modes × k) of directions.
   struct Data {
     MatrixXd left, in_sessions;  // projected at ratio 0: runs × k; session directions × k
   };
@@ -36,17 +67,9 @@ class Differences {
             coordinates.reshaped(coordinates.size() / modes, modes) * basis};
   }
 
-  struct Split {
-    double gain = 0;  // of the log-likelihood over alike sessions
-    std::size_t own = 0, others = 0;
-    double variance = 0;  // of runs
-  };
-
   /// `direction`: in the basis, of length 1. Only a larger variance is asked for.
   Split split(const Data& data, const VectorXd& direction) const {
-    const VectorXd squares = data.left.colwise().squaredNorm();
-    const MatrixXd covariance = data.left.transpose() * data.left;
-    const double own_squares = direction.dot(covariance * direction);
+    const double all_squares = data.left.squaredNorm(), own_squares = (data.left * direction).squaredNorm();
     const double dof = static_cast<double>(model_.dof(stratum_)) /
                        static_cast<double>(model_.strata()[stratum_].modes) *
                        static_cast<double>(direction.size());
@@ -65,7 +88,7 @@ class Differences {
     for (std::size_t b = 0; b < kRatios.size(); ++b)
       for (std::size_t a = b; a < kRatios.size(); ++a) {
         const double all = rss(own_squares, own_in_sessions, a) +
-                           rss(squares.sum() - own_squares, all_in_sessions - own_in_sessions, b);
+                           rss(all_squares - own_squares, all_in_sessions - own_in_sessions, b);
         const double likelihood = -0.5 * dof * std::log(all / dof) - determinant(a) - others * determinant(b);
         if (a == b) alike = std::max(alike, likelihood);
         if (likelihood > best.gain) best = {likelihood, a, b, all / dof};
@@ -74,7 +97,6 @@ class Differences {
     return best;
   }
 
- private:
   const MixedModel& model_;
   const std::size_t stratum_;
   const SessionDirections sessions_;
@@ -88,21 +110,14 @@ MatrixXd others_than(const VectorXd& direction) {
   return q.rightCols(q.cols() - 1);
 }
 
-/// A rotor whose sessions differ more: how much an offset of it is of the directions still alike, and how
-/// they split.
-struct Unlike {
-  Index rotor = 0;
-  VectorXd direction;  // among the differences
-  double share = 1;
-  Differences::Split split;
-};
-
 /// In modes, with R the runs' covariance and S that of sessions: W with WᵀRW and WᵀSW diagonal. The
 /// first column is the most of what rotors have in common; the last are what the unlike have no part in.
 MatrixXd uncorrelated(const MatrixXd& modes, const NullFit& fit, const std::vector<Unlike>& unlike,
                       const MatrixXd& alike) {
   const Index c = modes.cols(), k = static_cast<Index>(unlike.size()) + 1;
-  const double runs = unlike.back().split.variance, common_runs = std::pow(fit.sigma[0], 2);
+  constexpr double kLeast = 1e-9;  // of the variance of the differences: R has an inverse
+  const double runs = unlike.back().split.variance,
+               common_runs = std::max(std::pow(fit.sigma[0], 2), kLeast * runs);
   const double others = kRatios[unlike.back().split.others] * runs;
   VectorXd of_runs = VectorXd::Constant(c, runs);
   of_runs(0) = common_runs;
@@ -146,24 +161,10 @@ RotorSessions rotor_sessions(const Observations& observations, const std::vector
   MatrixXd alike = MatrixXd::Identity(channels - 1, channels - 1);
   std::vector<Unlike> found;
   while (channels - static_cast<Index>(found.size()) >= static_cast<Index>(kFewestToCompare)) {
-    const auto most_unlike = [&](const Stacked& set) {
-      const Differences::Data data = differences.data(set, alike);
-      Unlike most{.split = {.gain = -1}};
-      for (Index rotor = 0; rotor < channels; ++rotor) {
-        const bool known = std::ranges::any_of(found, [&](const Unlike& u) { return u.rotor == rotor; });
-        if (known) continue;
-        const VectorXd offset =
-            alike.transpose() * model.mode_matrix().row(rotor).tail(channels - 1).transpose();
-        const Differences::Split split = differences.split(data, offset.normalized());
-        if (split.gain > most.split.gain)
-          most = {rotor, alike * offset.normalized(), offset.squaredNorm(), split};
-      }
-      return most;
-    };
-    const Unlike most = most_unlike(column);
+    const Unlike most = differences.most_unlike(column, alike, found);
     bool by_chance = most.split.gain <= 0;
     for (Index i = 0; i < sets.cols() && !by_chance; ++i)
-      by_chance = most_unlike(sets.col(i)).split.gain >= most.split.gain;
+      by_chance = differences.most_unlike(sets.col(i), alike, found).split.gain >= most.split.gain;
     if (by_chance) break;
     alike = alike * others_than(alike.transpose() * most.direction);
     found.push_back(most);

@@ -56,10 +56,13 @@ function drawErrors({before, after, noise_floor: floor, unit}) {
     x1: floor,
     line: {color: style('--ink'), width: 1, dash: 'dot'}
   };
+  // Of two or three blocks an interval may end far outside: the errors are what is to be seen.
+  const farthest = 4 * Math.max(before.held_out_rmse, after.held_out_rmse, floor);
+  const end = Math.min(farthest, 1.05 * Math.max(before.held_out_ci95[1], after.held_out_ci95[1], floor));
   return {
     data: [floorDot, dot('after', after, colours[0], 'circle'), dot('before', before, colours[1], 'square')],
     layout: {
-      xaxis: axis(`root mean square error on blocks held out${unitBracket(unit)}`, {rangemode: 'tozero'}),
+      xaxis: axis(`root mean square error on blocks held out${unitBracket(unit)}`, {range: [0, end]}),
       yaxis: axis('', {type: 'category', categoryarray: names, categoryorder: 'array', range: [-0.5, 2.5]}),
       shapes: [line],
       showlegend: false

@@ -41,10 +41,10 @@ const residualTitle = () => {
 const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
 
 /** Groups of like x: every value of its own where there are few, else a dozen with as many points each. */
-function binsOf(x) {
+function binsOf(x, few = 14) {
   const order = x.map((_, i) => i).sort((a, b) => x[a] - x[b]);
   const values = [...new Set(x)];
-  if (values.length <= 14) return values.sort((a, b) => a - b).map((v) => order.filter((i) => x[i] === v));
+  if (values.length <= few) return values.sort((a, b) => a - b).map((v) => order.filter((i) => x[i] === v));
   const count = 12;
   return Array
       .from(
@@ -87,7 +87,8 @@ function bandOf(x, middle, half, colour) {
 
 /** Clouds of residuals with the means of like x, and what the effect makes of them. */
 function drawPanel(panel, which, reach) {
-  const bins = binsOf(panel.x), means = binned(panel.x, panel[which], bins);
+  const bins = binsOf(panel.x, panel.covariate === 'session' ? Infinity : undefined);
+  const means = binned(panel.x, panel[which], bins);
   const texts = panel.labels.map((label) => plain(nameOfText(label)));
   const [blue, orange] = rotorColours();
   const data = [

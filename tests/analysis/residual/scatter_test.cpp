@@ -168,8 +168,10 @@ TEST_F(Scatter, OfOneRotorsSessionsIsNoEffect) {
     for (const std::string& warning : e.warnings)
       said += warning.starts_with(fmt::format("sessions of rotor {} differ", i % 4 + 1)) ? 1 : 0;
     structure += e.adopted.empty() && (e.unknown.empty() || e.unknown[0].covariate == "session") ? 0 : 1;
-    for (const UnknownStructure& unknown : e.unknown)
-      structure += unknown.covariate == "session" && unknown.rotor != i % 4 ? 1 : 0;
+    if (e.unknown.empty() || e.unknown[0].covariate != "session") continue;
+    EXPECT_EQ(e.unknown[0].rotor, i % 4);
+    EXPECT_THAT(explanation_html(e, o, {}, {}),
+                testing::HasSubstr(fmt::format("unknown: session of rotor {}", i % 4 + 1)));
   }
   EXPECT_LE(structure, 4) << "binomial (24, 0.06): beyond 4 in 0.6 % of cases";
   EXPECT_GE(said, kCampaigns - 3);
