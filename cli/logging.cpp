@@ -70,8 +70,7 @@ Logging::Leftover::~Leftover() {
     return;
   }
   std::error_code error;  // the lock's own file goes with the lock
-  for (const char* suffix : {"", "-wal", "-shm"})
-    std::filesystem::remove(file.path().string() + suffix, error);
+  for (const auto& each : files_of_campaign(file.path())) std::filesystem::remove(each, error);
 }
 
 Logging::Logging(const LogOptions& options)

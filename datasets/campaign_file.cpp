@@ -119,8 +119,7 @@ std::string unchanging(const std::filesystem::path& path) {
 
 std::vector<std::filesystem::path> files_of_campaign(const std::filesystem::path& path) {
   std::vector<std::filesystem::path> files;
-  for (const char* suffix : {"", "-wal", "-shm", "-journal", ".lock"})
-    files.push_back(with_suffix(path, suffix));
+  for (const char* suffix : {"", "-wal", "-shm", "-journal"}) files.push_back(with_suffix(path, suffix));
   return files;
 }
 

@@ -113,8 +113,7 @@ class CampaignFile {
   std::unique_ptr<Database> database_;
 };
 
-/// The campaign file at a path, and what SQLite and the recorder keep beside it: journals, shared memory,
-/// lock.
+/// The campaign file at a path, and what SQLite keeps beside it: journals, shared memory.
 std::vector<std::filesystem::path> files_of_campaign(const std::filesystem::path& path);
 
 /// Builds a campaign file under a temporary name beside `target` and puts it in place whole, or not at all.

@@ -57,7 +57,7 @@ void refuse_campaign_itself(const CampaignFile& file, const std::filesystem::pat
     return std::filesystem::weakly_canonical(path, error);
   };
   std::vector<std::filesystem::path> own = files_of_campaign(file.path());
-  own.emplace_back(file.path().string() + ".part");
+  for (const char* suffix : {".lock", ".part"}) own.emplace_back(file.path().string() + suffix);
   for (const auto& each : own) {
     if (real(target) == real(each))
       throw InputError::in(target.string(),

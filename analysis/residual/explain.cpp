@@ -132,7 +132,7 @@ std::string taken_back_all(const Explanation& explanation) {
     if (!adopted.term.effect->theory_only) names.push_back(adopted.term.label());
   return fmt::format(
       "{} found and taken back: the error of the sealed blocks is {:.4g}{} with {}, {:.4g} without",
-      fmt::join(names, ", "), explanation.sealed.all, explanation.unit == "1" ? "" : " " + explanation.unit,
+      fmt::join(names, ", "), explanation.sealed.all, explanation.unit_suffix(),
       names.size() > 1 ? "them" : "it", explanation.sealed.curves);
 }
 

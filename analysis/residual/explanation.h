@@ -87,6 +87,8 @@ struct SuspectRow {
 
 struct Explanation {
   std::string campaign, response, unit, baseline, verdict;
+  /// " N", behind a number; nothing where the unit is 1 or not known.
+  std::string unit_suffix() const { return unit.empty() || unit == "1" ? "" : " " + unit; }
   double noise_floor = 0;
   int blocks = 0, runs = 0;
   ErrorEstimate before, after;

@@ -185,11 +185,7 @@ class Page {
   MatrixXd added_by(std::size_t t) const {
     const AdoptedEffect& adopted = explanation_.adopted[t];
     if (!adopted.term.per_group) return respond(adopted.term, observations_, forces_.acted_on[t]).value[0];
-    VectorXd amplitude = VectorXd::Zero(observations_.groups());
-    for (const GroupEstimate& estimate : adopted.parameters[0].groups)
-      for (int group = 0; group < observations_.groups(); ++group)
-        if (observations_.group_name[static_cast<std::size_t>(group)] == estimate.group)
-          amplitude(group) = estimate.value;
+    const VectorXd amplitude = values_by_group(observations_, adopted.parameters[0].groups);
     return respond_in_groups(adopted.term, amplitude, observations_, forces_.acted_on[t]).value;
   }
 

@@ -188,7 +188,7 @@ std::string explanation_json(const Explanation& e) {
 }
 
 std::string explanation_text(const Explanation& e) {
-  const std::string unit = e.unit.empty() || e.unit == "1" ? "" : " " + e.unit;
+  const std::string unit = e.unit_suffix();
   std::string text = fmt::format("{}{}response {}, baseline {}, {} runs in {} block{}\n\n{}: {}\n",
                                  e.campaign, e.campaign.empty() ? "" : ": ", e.response, e.baseline, e.runs,
                                  e.blocks, e.blocks == 1 ? "" : "s", e.verdict, verdict_in_words(e.verdict));

@@ -19,15 +19,22 @@ constexpr double kLeastSeen = 1e-6;  // of a column: below it what is left is ro
 VectorXd amplitudes_of(const Observations& observations, const JointFit& fit, std::size_t t,
                        const std::vector<int>& rows) {
   const EffectParameter& amplitude = fit.model.terms[t].effect->parameters[0];
-  VectorXd result = VectorXd::Zero(observations.groups());
-  for (const GroupEstimate& estimate : estimate_by_group(observations, fit.model, t, fit.variances, rows))
-    for (int group = 0; group < observations.groups(); ++group)
-      if (observations.group_name[static_cast<std::size_t>(group)] == estimate.group)
-        result(group) = std::clamp(estimate.value, amplitude.lower, amplitude.upper);
-  return result;
+  auto estimates = estimate_by_group(observations, fit.model, t, fit.variances, rows);
+  for (GroupEstimate& estimate : estimates)
+    estimate.value = std::clamp(estimate.value, amplitude.lower, amplitude.upper);
+  return values_by_group(observations, estimates);
 }
 
 }  // namespace
+
+VectorXd values_by_group(const Observations& observations, const std::vector<GroupEstimate>& estimates) {
+  VectorXd result = VectorXd::Zero(observations.groups());
+  for (const GroupEstimate& estimate : estimates)
+    for (int group = 0; group < observations.groups(); ++group)
+      if (observations.group_name[static_cast<std::size_t>(group)] == estimate.group)
+        result(group) = estimate.value;
+  return result;
+}
 
 OwnResponse respond_in_groups(Term term, const VectorXd& amplitude, const Observations& observations,
                               const MatrixXd& forces) {
@@ -50,8 +57,8 @@ JointFit fit_in_turns(Observations& observations, const MeanModel& model, const 
   constexpr int kMostTurns = 10;
   constexpr double kSettled = 1e-4;  // of what the effect does
   JointFit fit = fit_jointly(observations, model, rows);
-  const Index first = observations.slopes.cols() - observations.beyond.cols();
-  bool settled = observations.beyond.cols() == 0;
+  const Index first = observations.first_own_slope();
+  bool settled = false;
   for (int turn = 0; turn < kMostTurns && !settled; ++turn) {
     const VectorXd predicted = predict_response(observations, fit.model, rows).col(0);
     MatrixXd slopes = observations.slopes, beyond = observations.beyond;
@@ -80,7 +87,7 @@ JointFit fit_in_turns(Observations& observations, const MeanModel& model, const 
 std::vector<GroupEstimate> estimate_by_group(const Observations& observations, const MeanModel& model,
                                              std::size_t t, const NullFit& variances,
                                              const std::vector<int>& rows) {
-  const Index column = observations.slopes.cols() - observations.beyond.cols() + place_among_own(model, t);
+  const Index column = observations.first_own_slope() + place_among_own(model, t);
   const Components offset = linearise(observations, model, predict_forces(observations, model, rows)).offset;
   std::vector<GroupEstimate> result;
   for (const auto& [group, own] : rows_of_each(observations.group, rows)) {

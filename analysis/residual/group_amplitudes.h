@@ -20,6 +20,10 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
                                              std::size_t t, const NullFit& variances,
                                              const std::vector<int>& rows);
 
+/// By group; 0 where the estimates have none.
+Eigen::VectorXd values_by_group(const Observations& observations,
+                                const std::vector<GroupEstimate>& estimates);
+
 /// n: what a term does on these forces, with an amplitude for each group, and its derivative by that.
 struct OwnResponse {
   Eigen::VectorXd value, derivative;

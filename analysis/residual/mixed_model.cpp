@@ -154,6 +154,12 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
     for (const std::size_t r : wanted) log_determinant_[s][r] = make_log_determinant(s, r);
 }
 
+std::size_t MixedModel::differences() const {
+  std::size_t s = 0;
+  while (!strata_[s].means() || strata_[s].side() == 0) ++s;
+  return s;
+}
+
 double MixedModel::run_correlation(std::size_t stratum) const {
   return strata_[stratum].means() ? run_correlation_[strata_[stratum].side()] : 0;
 }

@@ -5,9 +5,9 @@
 // The rotors' y are rotated into one common and c − 1 difference modes (each rotor's first divided by its
 // scatter, where they differ in it; of rotors whose sessions differ more, each has a mode of its own); the
 // runs' means and each cosine coefficient of their course, common or difference, make a stratum with a run
-// variance σ² and a session variance a σ² of its own. A run's mean may
-// be correlated with that of the run before it by φ, and scatter d times as much as most: V = σ² (DΦD + a
-// 11ᵀ) in each session, Φ_ij = φ^|i − j|, D = diag(d). docs/closed-loop.md has the equations.
+// variance σ² and a session variance a σ² of its own. A run's mean may be correlated with that of the run
+// before it by φ, and scatter d times as much as most: V = σ² (DΦD + a 11ᵀ) in each session, Φ_ij =
+// φ^|i − j|, D = diag(d). docs/closed-loop.md has the equations.
 #pragma once
 
 #include "analysis/residual/terms.h"
@@ -56,6 +56,8 @@ class MixedModel {
   const std::vector<int>& rows() const { return rows_; }
   const std::vector<std::vector<Eigen::Index>>& blocks() const { return blocks_; }  // positions in rows()
   const std::vector<Stratum>& strata() const { return strata_; }
+  /// Of the runs' means, the stratum of what rotors differ by; there are two rotors at least.
+  std::size_t differences() const;
   Eigen::Index dof(std::size_t stratum) const;  // runs · modes less the baseline's
   /// Restricted likelihood's constant, ½ log(…).
   double log_determinant(std::size_t stratum, std::size_t ratio) const {

@@ -152,6 +152,7 @@ struct Observations {
   std::string baseline_over;            // covariate that a table's line or power law is over; or empty
   std::vector<std::string> other_axes;  // covariates of a linear baseline's quantity
 
+  Eigen::Index first_own_slope() const { return slopes.cols() - beyond.cols(); }
   Eigen::Index rows() const { return y.rows(); }
   Eigen::Index channels() const { return y.cols(); }
   int groups() const { return static_cast<int>(group_name.size()); }

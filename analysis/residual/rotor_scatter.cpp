@@ -48,12 +48,6 @@ MatrixXd differences(const MixedModel& model, std::size_t stratum, std::size_t r
          model.rotors_of_modes().bottomRows(modes);
 }
 
-std::size_t differences_stratum(const MixedModel& model) {
-  std::size_t s = 0;
-  while (!model.strata()[s].means() || model.strata()[s].side() == 0) ++s;
-  return s;
-}
-
 }  // namespace
 
 VectorXd rotor_scatter(const Observations& observations, const std::vector<int>& rows,
@@ -65,7 +59,7 @@ VectorXd rotor_scatter(const Observations& observations, const std::vector<int>&
   while (alike.size() >= kFewestToCompare) {
     const MixedModel model(seen, rows);
     const NullFit fit = CandidateScan(model, {}, {}).null_fit(residual);
-    const std::size_t s = differences_stratum(model), ratio = fit.ratio[s];
+    const std::size_t s = model.differences(), ratio = fit.ratio[s];
     const MatrixXd rotors = differences(model, s, ratio, model.stack(s, {&residual}));
     Index most = 0;
     const double unlike = unlikeness(rotors, alike).cwiseAbs().maxCoeff(&most);

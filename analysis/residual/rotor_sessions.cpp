@@ -4,6 +4,7 @@
 #include "analysis/residual/session_directions.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -75,21 +76,21 @@ class Differences {
                        static_cast<double>(direction.size());
     const VectorXd own_in_sessions = (data.in_sessions * direction).cwiseAbs2();
     const VectorXd all_in_sessions = data.in_sessions.rowwise().squaredNorm();
-    const auto rss = [&](double all, const VectorXd& in_sessions, std::size_t ratio) {
-      const VectorXd weights = sessions_.weights(kRatios[ratio]).head(in_sessions.size());
-      return all - weights.dot(in_sessions);
-    };
-    const auto determinant = [&](std::size_t ratio) {
-      return model_.log_determinant(stratum_, ratio) / static_cast<double>(model_.strata()[stratum_].modes);
-    };
+    std::array<double, kRatios.size()> own_rss, others_rss, determinant;
+    for (std::size_t r = 0; r < kRatios.size(); ++r) {
+      const VectorXd weights = sessions_.weights(kRatios[r]).head(own_in_sessions.size());
+      own_rss[r] = own_squares - weights.dot(own_in_sessions);
+      others_rss[r] = all_squares - own_squares - weights.dot(all_in_sessions - own_in_sessions);
+      determinant[r] =
+          model_.log_determinant(stratum_, r) / static_cast<double>(model_.strata()[stratum_].modes);
+    }
     const auto others = static_cast<double>(direction.size() - 1);
     double alike = -std::numeric_limits<double>::infinity();
     Split best{-std::numeric_limits<double>::infinity(), 0, 0, 0};
     for (std::size_t b = 0; b < kRatios.size(); ++b)
       for (std::size_t a = b; a < kRatios.size(); ++a) {
-        const double all = rss(own_squares, own_in_sessions, a) +
-                           rss(all_squares - own_squares, all_in_sessions - own_in_sessions, b);
-        const double likelihood = -0.5 * dof * std::log(all / dof) - determinant(a) - others * determinant(b);
+        const double all = own_rss[a] + others_rss[b];
+        const double likelihood = -0.5 * dof * std::log(all / dof) - determinant[a] - others * determinant[b];
         if (a == b) alike = std::max(alike, likelihood);
         if (likelihood > best.gain) best = {likelihood, a, b, all / dof};
       }
@@ -152,8 +153,7 @@ RotorSessions rotor_sessions(const Observations& observations, const std::vector
   const MixedModel model(observations, rows);
   const Index channels = observations.channels();
   if (channels < static_cast<Index>(kFewestToCompare) || model.ratios() == 1) return {};
-  std::size_t s = 0;
-  while (!model.strata()[s].means() || model.strata()[s].side() == 0) ++s;
+  const std::size_t s = model.differences();
   const NullFit fit = CandidateScan(model, {}, {}).null_fit(residual);
   const Differences differences(model, s);
   const Stacked column = model.stack(s, {&residual});

@@ -91,7 +91,7 @@ std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
   std::size_t t = 0;
   while (!fit_.model.terms[t].same_way(accepted.term)) ++t;
   const Index own_place = place_among_own(fit_.model, t);
-  const Index place = observations_.slopes.cols() - observations_.beyond.cols() + own_place;
+  const Index place = observations_.first_own_slope() + own_place;
   Observations fewer = observations_;
   fewer.slopes = without_column(observations_.slopes, place);
   fewer.beyond = without_column(observations_.beyond, own_place);
