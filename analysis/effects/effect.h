@@ -84,6 +84,9 @@ struct Effect {
   /// What it says the cause is: its name, whatever its form; of a table's other axes the axis as well.
   std::string cause() const;
   std::optional<double> theory() const { return parameters[0].theory; }
+  /// Where effects add forces, each acts on what those of the stages before have made: 0 the rotor and its
+  /// air, 1 the cell, 2 what is added to its reading.
+  int stage() const { return additive ? 2 : scope == EffectScope::kShared ? 0 : 1; }
 };
 
 /// Completes a description by its formula: a functor `T operator()(const Sample&, const T* p, const T& F)

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 
 namespace tunnelrig {
@@ -38,6 +39,11 @@ class Forward {
       for (const std::string& name : term.effect->covariates)
         term_covariates_.back().push_back(observations.find(name));
     }
+    order_.resize(model.terms.size());
+    std::iota(order_.begin(), order_.end(), 0U);
+    std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
+      return model.terms[a].effect->stage() < model.terms[b].effect->stage();
+    });
     for (const ModelCurve& curve : model.curves) {
       first_curve_.push_back(next);
       next += static_cast<Index>(curve.coefficients.size());
@@ -84,11 +90,11 @@ class Forward {
     VectorXd result = force_N;
     for (Index c = 0; c < force_N.size(); ++c) {
       double factor = 1, added = 0;
-      for (std::size_t t = 0; t < model_.terms.size(); ++t) {
+      for (const std::size_t t : order_) {
         if (!applies(t, row, c)) continue;
         const bool previous = model_.terms[t].effect->needs_previous;
         // What depends on the run before is judged by predictions, or its sign would follow the scatter.
-        const double from = previous ? predicted_(row, c) : force_N(c);
+        const double from = previous ? predicted_(row, c) : force_N(c) + added;
         const double to = mean_changed(t, row, c, from, force_N, parameters);
         model_.multiplicative ? factor *= to / from : added += to - from;
       }
@@ -208,6 +214,7 @@ class Forward {
   const ModelVersion& model_;
   const Observations& observations_;
   std::vector<Index> first_, first_curve_;
+  std::vector<std::size_t> order_;  // in which terms act
   std::vector<std::vector<const Covariate*>> term_covariates_;
   std::vector<const Covariate*> curve_covariates_;
   std::vector<const Place*> curve_places_;     // null: alike everywhere

@@ -60,7 +60,7 @@ JointFit fit_in_turns(Observations& observations, const MeanModel& model, const 
   const Index first = observations.first_own_slope();
   bool settled = false;
   for (int turn = 0; turn < kMostTurns && !settled; ++turn) {
-    const VectorXd predicted = predict_response(observations, fit.model, rows).col(0);
+    const Forces forces = predict_forces(observations, fit.model, rows);
     MatrixXd slopes = observations.slopes, beyond = observations.beyond;
     settled = true;
     for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
@@ -69,8 +69,9 @@ JointFit fit_in_turns(Observations& observations, const MeanModel& model, const 
       const VectorXd by_group = amplitudes_of(observations, fit, t, rows);
       const VectorXd amplitude = by_group(observations.group);
       const VectorXd made = amplitude.cwiseProduct(slopes.col(first + k)) + beyond.col(k);
-      const VectorXd acted_on = observations.multiplicative ? VectorXd(predicted.array() / made.array().exp())
-                                                            : VectorXd(predicted - made);
+      const VectorXd with_it = forces.acted_on[t].col(0);  // a part of the baseline
+      const VectorXd acted_on = observations.multiplicative ? VectorXd(with_it.array() / made.array().exp())
+                                                            : VectorXd(with_it - made);
       const OwnResponse own = respond_in_groups(fit.model.terms[t], by_group, observations, acted_on);
       slopes.col(first + k) = own.derivative;
       beyond.col(k) = own.value - amplitude.cwiseProduct(own.derivative);

@@ -234,6 +234,25 @@ MatrixXd on_baseline(const Observations& observations, const MatrixXd& residual,
   return predicted;
 }
 
+/// What each term acts on, `own` being what it adds. Of logarithms, in which factors stand side by side, all
+/// the rest; of forces what the terms before it have made, or a product of two would be counted with both.
+std::vector<MatrixXd> acted_on(const Observations& observations, const std::vector<Term>& terms,
+                               const MatrixXd& predicted, const std::vector<MatrixXd>& own) {
+  std::vector<MatrixXd> result;
+  if (observations.multiplicative) {
+    for (const MatrixXd& each : own) result.emplace_back(predicted.array() / each.array().exp());
+    return result;
+  }
+  result.resize(terms.size());
+  MatrixXd made = predicted;
+  for (const MatrixXd& each : own) made -= each;
+  for (const std::size_t t : order_of_action(terms)) {
+    result[t] = made;
+    made += own[t];
+  }
+  return result;
+}
+
 }  // namespace
 
 /// The baseline is what is left without the effects, and they act on what the baseline makes: found in turns.
@@ -261,9 +280,7 @@ Forces predict_forces(const Observations& observations, const MeanModel& model,
     }
     MatrixXd predicted = on_baseline(observations, residual, added, rows);
     if (!predicted.allFinite()) break;  // a force that has changed its sign has no logarithm
-    for (std::size_t t = 0; t < own.size(); ++t)
-      forces.acted_on[t] = observations.multiplicative ? MatrixXd(predicted.array() / own[t].array().exp())
-                                                       : MatrixXd(predicted - own[t]);
+    forces.acted_on = acted_on(observations, model.terms, predicted, own);
     change = (predicted - forces.predicted).cwiseAbs().maxCoeff();
     forces.predicted = std::move(predicted);
     if (change <= kSettled * forces.predicted.cwiseAbs().maxCoeff()) break;

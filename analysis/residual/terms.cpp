@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <set>
 
@@ -244,6 +245,15 @@ std::vector<double> reference_of(const Effect& effect, const Observations& obser
     result.push_back(upper_median(std::move(values)));
   }
   return result;
+}
+
+std::vector<std::size_t> order_of_action(const std::vector<Term>& terms) {
+  std::vector<std::size_t> order(terms.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto stage = [&](std::size_t t) { return terms[t].per_group ? -1 : terms[t].effect->stage(); };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return stage(a) < stage(b); });
+  return order;
 }
 
 Testability testability(const Effect& effect, const Observations& observations) {

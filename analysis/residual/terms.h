@@ -23,6 +23,10 @@ struct Term {
   bool same_way(const Term& term) const;  // same effect, form, rotor: only its shape may differ
 };
 
+/// Places of the terms, the first to act first: by stage, and as they were adopted. An amplitude of each
+/// group's own is a part of the baseline.
+std::vector<std::size_t> order_of_action(const std::vector<Term>& terms);
+
 /// A quantity in every component of the response: the runs' means (n × c), then each cosine coefficient of
 /// their course.
 using Components = std::vector<Eigen::MatrixXd>;

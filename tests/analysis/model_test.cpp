@@ -91,6 +91,25 @@ TEST(ApplyModel, ReadingsAreLedBackThroughEveryTerm) {
   }
 }
 
+/// Air, then cell, then what is added, in whatever order they were adopted.
+TEST(ApplyModel, WhereEffectsAddEachActsOnWhatThoseBeforeItMade) {
+  const CampaignData data = four_runs();
+  const double c = 0.05, tau = 100, x = -0.03;
+  ModelVersion model = model_of({term("crosstalk", {x}, {}, 0, 1), term("creep", {c, tau}, {100}),
+                                 term("air_pressure", {1}, {100000})});
+  model.multiplicative = false;
+  const Reduction reduction = corrected(data, model);
+  ASSERT_EQ(reduction.runs.size(), 4u);
+  for (const RunCoefficients& run : reduction.runs) {
+    const tunnelrig::Run& given = data.runs[run.run];
+    const double creep = 1 + c * (1 - std::exp(-*given.number("time_since_motor_start_s") / tau));
+    const double air = *given.number("air_pressure_Pa") / 101325;
+    const auto& force = run.thrust_N;
+    EXPECT_NEAR(force[0] * air * creep + x * force[1], *given.thrust_N[0], 1e-9);
+    EXPECT_NEAR(force[1] * air * creep, *given.thrust_N[1], 1e-9);
+  }
+}
+
 TEST(ApplyModel, ACurveIsTakenOutAndHeldBeyondItsRange) {
   ModelVersion model{.version = 1, .explanation = "{}"};
   model.curves = {{.covariate = "clip", .low = 0.1, .high = 0.4, .coefficients = {0.02}, .centre = {0.5}}};
