@@ -71,6 +71,7 @@ struct Effect {
   bool tunnel_only = false;  // acts at tunnel locations only
   bool theory_only = false;  // the amplitude is theory's whenever the effect is adopted
   bool additive = false;     // adds a force, where others scale it
+  bool of_reading = false;   // scales what a cell reads, whatever load makes it read so
   bool of_zero = false;      // is in the tares as well, which take it off
   bool needs_previous = false;
   std::string sign_rule;  // what the bounds of the amplitude mean, in words
@@ -85,8 +86,8 @@ struct Effect {
   std::string cause() const;
   std::optional<double> theory() const { return parameters[0].theory; }
   /// Where effects add forces, each acts on what those of the stages before have made: 0 the rotor and its
-  /// air, 1 the cell, 2 what is added to its reading.
-  int stage() const { return additive ? 2 : scope == EffectScope::kShared ? 0 : 1; }
+  /// air, 1 the cell, 2 what scales its reading, 3 what is added to that.
+  int stage() const { return additive ? 3 : of_reading ? 2 : scope == EffectScope::kShared ? 0 : 1; }
 };
 
 /// Completes a description by its formula: a functor `T operator()(const Sample&, const T* p, const T& F)

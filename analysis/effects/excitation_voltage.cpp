@@ -25,6 +25,7 @@ std::vector<Effect> excitation_voltage() {
       .parameters = {{"exponent", "1", 0, 3, ParameterRole::kAmplitude, {}, 1.0}},
       .covariates = {"excitation_voltage_V"},
       .scope = EffectScope::kShared,
+      .of_reading = true,
       .sign_rule = "output grows with excitation",
       .force_N = {},
       .jet_N = {},

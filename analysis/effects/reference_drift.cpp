@@ -25,6 +25,7 @@ std::vector<Effect> reference_drift() {
       .parameters = {{"exponent", "1", 0, 3, ParameterRole::kAmplitude, {}, 1.0}},
       .covariates = {"adc_reference_V"},
       .scope = EffectScope::kShared,
+      .of_reading = true,
       .sign_rule = "reading falls as the reference rises",
       .force_N = {},
       .jet_N = {},

@@ -182,6 +182,8 @@ ParameterEstimate summary_of_groups(const EffectParameter& parameter, std::vecto
 }
 
 std::string unit_of(const Observations& observations, const EffectParameter& parameter) {
+  if (observations.from_table && parameter.unit == "1/N")
+    return observations.unit == "1" ? "1" : "1/" + observations.unit;
   const bool volts = parameter.unit == "V" || parameter.unit.starts_with("V/");
   if (!volts || (observations.newtons_per_volt.array() != 1).any()) return parameter.unit;
   return observations.unit + parameter.unit.substr(1);

@@ -156,7 +156,7 @@ void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
 std::vector<std::string> Search::conditions_of(const Effect& effect) const {
   const bool of_force_alone = effect.covariates.empty() && effect.scope != EffectScope::kPair &&
                               !effect.needs_previous && !effect.has_change_point();
-  if (!of_force_alone || !observations_.is_power_law()) return effect.covariates;
+  if (!of_force_alone || observations_.baseline_over.empty()) return effect.covariates;
   return {observations_.baseline_over};
 }
 

@@ -41,17 +41,27 @@ bool is_in_volts(const EffectParameter& parameter) {
   return parameter.unit == "V" || parameter.unit.starts_with("V/");
 }
 
-/// What a drift of the zero can be is known of volts. In counts or newtons it depends on the converter and
-/// the cell, and only the sign is left.
-std::optional<Effect> without_bounds_in_volts(const Effect& effect) {
-  constexpr double kNoBound = 1e12;
-  if (std::none_of(effect.parameters.begin(), effect.parameters.end(), is_in_volts)) return {};
+void bound_by(double limit, EffectParameter& parameter) {
+  if (parameter.lower < 0) parameter.lower = -limit;
+  if (parameter.upper > 0) parameter.upper = limit;
+}
+
+/// With the bounds that hold for this table's response, where they are others. What a drift of the zero can
+/// be is known of volts: in counts or newtons it depends on the converter and the cell, and only the sign is
+/// left. A cell that bends by more than a tenth over its range is none.
+std::optional<Effect> bounded_as_here(const Effect& effect, const Observations& observations) {
+  constexpr double kNoBound = 1e12, kMostBent = 0.1;
   Effect own = effect;
+  bool differs = false;
   for (EffectParameter& parameter : own.parameters) {
-    if (!is_in_volts(parameter)) continue;
-    if (parameter.lower < 0) parameter.lower = -kNoBound;
-    if (parameter.upper > 0) parameter.upper = kNoBound;
+    const bool in_volts = is_in_volts(parameter) && observations.unit != "V";
+    const bool per_newton = parameter.unit == "1/N" && observations.unit != "N";
+    if (in_volts) bound_by(kNoBound, parameter);
+    if (per_newton)
+      bound_by(kMostBent / (observations.value.maxCoeff() - observations.value.minCoeff()), parameter);
+    differs |= in_volts || per_newton;
   }
+  if (!differs) return {};
   return own;
 }
 
@@ -62,8 +72,8 @@ TableEffects::TableEffects(const Observations& observations, const std::vector<c
   const std::size_t axes = own_.size();
   std::vector<const Effect*> replaced;  // of the program's own: a user's bounds are the user's
   for (const Effect& effect : all_effects()) {
-    if (!observations.from_table || observations.unit == "V") break;
-    if (auto own = without_bounds_in_volts(effect)) {
+    if (!observations.from_table) break;
+    if (auto own = bounded_as_here(effect, observations)) {
       own_.push_back(std::move(*own));
       replaced.push_back(&effect);
     }

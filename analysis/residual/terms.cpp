@@ -301,8 +301,6 @@ Testability testability(const Effect& effect, const Observations& observations) 
         is_made_c_t(observations) && !observations.multiplicative
             ? "the baseline has a constant beside C_T"
             : "only a table's thrust whose speed was measured shows it, by how large it is beside small ones";
-  if (observations.is_line() && (effect.name == "nonlinearity" || effect.name == "bidirectional"))
-    result.reason = "a curve over the baseline's column says where it is not straight";
   if (effect.needs_previous && std::all_of(observations.previous.begin(), observations.previous.end(),
                                            [](int before) { return before < 0; }))
     result.reason = "the rows have no order, which a condition run_order would give them";

@@ -164,22 +164,6 @@ TEST_F(TableSourceTest, ThrustsOfBothDirectionsAreOfASpeedWithTheirSign) {
   EXPECT_LT(e.after.held_out_rmse, 0.05 * e.before.held_out_rmse);
 }
 
-/// Blades that gain with the Reynolds number do so in both directions: the product is no third effect.
-TEST_F(TableSourceTest, WhatBothDirectionsAndTheReynoldsNumberDoTogetherIsTheirProduct) {
-  std::string csv = "b,N,y\n";
-  for (int r = 0; r < 240; ++r) {
-    const double rpm = 800 + 3200 * even(random);
-    const double full_N = 40 * std::pow(rpm / 3000, 2) * std::pow(rpm / 2500, 0.1);
-    csv += fmt::format("{},{},{}\n", r / 10, rpm,
-                       (r % 2 == 0 ? full_N : -0.8 * full_N) + 0.02 * scatter(random));
-  }
-  const Explanation e = explained(observed(csv, kThrustAndSpeed));
-  ASSERT_EQ(names(e), "bidirectional reynolds_number ") << explanation_text(e);
-  EXPECT_EQ(e.verdict, "explained") << explanation_text(e);
-  EXPECT_NEAR(e.adopted[0].parameters[0].value, -0.2, 0.001);
-  EXPECT_NEAR(e.adopted[1].parameters[0].value, 0.1, 0.001);
-}
-
 /// The density that C_T is made with has the pressure; it is not sought again.
 TEST_F(TableSourceTest, RowsWithoutAirHaveNoC_TAndItsPressureIsNotSoughtAgain) {
   std::string csv = "b,N,T,p,y\n";
