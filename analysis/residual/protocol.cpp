@@ -137,6 +137,11 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
   explanation.detectable =
       scale_of(observations) *
       detectable_by_one(MixedModel(observations, rows, fit.variances.ratio), fit.variances, settings.alpha);
+  // Too few blocks for an effect are enough to see a typing error.
+  const HeldOutErrors fitted = score(observations, fit, fit.variances, rows, rows);
+  explanation.suspect_rows = gross_rows(
+      observations,
+      suspect_rows(observations, fitted, fit.variances, degrees_of_freedom(observations, fit, rows)));
   explanation.verdict = "insufficient";
 }
 

@@ -50,7 +50,7 @@ double sigma_by_median(const VectorXd& sizes) {
 }
 
 /// Several gross rows hide each other in the variance: of n rows, k alike are hardly beyond √(n/k) of it. But
-/// they lie apart. Scaled residuals of a table's rows, each from its group's median, in σ by the median size
+/// they lie apart. Residuals of a table's rows, each from its group's median, in σ by the median size
 /// of all, where these are the farthest (at most one of ten): beyond 10, and twice as far as the next; 0
 /// elsewhere. The tails of a distribution, or of a group that scatters more, have no such gap.
 VectorXd distance_of_those_apart(const Observations& observations, const std::vector<int>& rows,
@@ -91,15 +91,19 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
         unit = std::abs(value + errors.error(r, c));  // what was predicted
         residual(r, c) = std::log(std::abs(value) / unit);
       }
-      residual(r, c) /= std::sqrt(sigma2(r, c));
       left(r, c) = std::max(2 - std::pow(errors.expected_std(r, c) / unit, 2) / sigma2(r, c), kLeastLeft);
     }
+  VectorXd apart = VectorXd::Zero(residual.rows());
+  if (observations.from_table) apart = distance_of_those_apart(observations, errors.rows, residual.col(0));
+  residual.array() /= sigma2.array().sqrt();
+  // A gross row under a rare condition may have been taken for scatter that goes with it, and others for
+  // none.
+  if (observations.from_table && apart.isZero(0))
+    apart = distance_of_those_apart(observations, errors.rows, residual.col(0));
   const auto missing = residual.array().isNaN();
   const double variance = missing.select(0, residual).squaredNorm() / missing.select(0, left).sum();
   const double limit = student_t_quantile(
       1 - 0.005 / static_cast<double>(std::max<Index>(1, residual.size())), std::max(dof - 1, 1.0));
-  VectorXd apart = VectorXd::Zero(residual.rows());
-  if (observations.from_table) apart = distance_of_those_apart(observations, errors.rows, residual.col(0));
   std::vector<SuspectRow> result;
   for (Index r = 0; r < residual.rows(); ++r) {
     double worst = apart(r);

@@ -1,11 +1,17 @@
-// Runs whose conditions were mistyped.
+// Runs whose conditions were mistyped, and rows whose responses were.
 #include "analysis/residual/explanation_output.h"
 #include "analysis/residual/explanation_parts.h"
 #include "analysis/residual/simulated.h"
+#include "analysis/residual/tables.h"
 #include "support/seeds.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -14,6 +20,7 @@ namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
+using testing::UnorderedElementsAreArray;
 
 struct Mistyped : testing::Test {
   std::mt19937_64 random{test::seed()};
@@ -70,6 +77,62 @@ TEST_F(Mistyped, GapsOfADistanceAreNoValues) {
   for (const Eigen::Index run : {3, 9, 40}) volts(run) = std::numeric_limits<double>::infinity();
   ASSERT_EQ(isolated_values(campaign).size(), 1u);
   EXPECT_GT(isolated_values(campaign)[0].low, 10);
+}
+
+struct GrossRowsTest : test::TablesTest {
+  /// Thrust over speed with a Reynolds number's 0.1 and 1 % of scatter; each of `wrong` multiplies one of the
+  /// fastest rows, one of five. Lines of the rows that are wrong.
+  std::string csv;
+  std::vector<std::string> lines;
+  void write_thrusts(const std::vector<double>& wrong, int blocks = 12) {
+    std::vector<double> rpm(96);
+    for (double& each : rpm) each = 2000 + 6000 * even(random);
+    std::vector<std::size_t> fastest(rpm.size());
+    std::iota(fastest.begin(), fastest.end(), 0U);
+    std::sort(fastest.begin(), fastest.end(), [&](std::size_t a, std::size_t b) { return rpm[a] > rpm[b]; });
+    std::vector<double> factor(rpm.size(), 1);
+    for (std::size_t k = 0; k < wrong.size(); ++k) {
+      factor[fastest[5 * k + 1]] = wrong[k];
+      lines.push_back(fmt::format("t.csv:{}", fastest[5 * k + 1] + 2));
+    }
+    csv = "b,N,y\n";
+    for (std::size_t r = 0; r < rpm.size(); ++r)
+      csv += fmt::format("{},{:.1f},{:.5f}\n", static_cast<int>(r) % blocks, rpm[r],
+                         6 * std::pow(rpm[r] / 5000, 2.1) * (1 + 0.01 * scatter(random)) * factor[r]);
+  }
+  Explanation explained(const std::string& more = "") const {
+    return test::explained(
+        observed(csv, "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n" + more +
+                          "meaning = \"thrust_N\"\n[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n"
+                          "[propeller]\ndiameter_m = 0.2\n"));
+  }
+  static std::vector<std::string> set_aside(const Explanation& e) {
+    std::vector<std::string> rows;
+    for (const SuspectRow& row : e.suspect_rows)
+      if (row.set_aside) rows.push_back(row.row);
+    return rows;
+  }
+};
+
+/// A few gross rows at high speed look like scatter that grows with the speed.
+TEST_F(GrossRowsTest, AreNotTakenForScatterThatGoesWithTheSpeed) {
+  write_thrusts({1.5, 1.6, 1.4});
+  const Explanation e = explained();
+  EXPECT_THAT(set_aside(e), UnorderedElementsAreArray(lines)) << explanation_text(e);
+  EXPECT_EQ(e.adopted.size(), 1u) << explanation_text(e);
+}
+
+TEST_F(GrossRowsTest, AreAllSetAsideWhereEachHidesTheNext) {
+  write_thrusts({1000, 40, 2});
+  const Explanation e = explained("scatter = \"absolute\"\n");
+  EXPECT_THAT(set_aside(e), UnorderedElementsAreArray(lines)) << explanation_text(e);
+}
+
+TEST_F(GrossRowsTest, AreFoundInTooFewBlocksForAnEffect) {
+  write_thrusts({1.5}, 4);
+  const Explanation e = explained();
+  EXPECT_EQ(e.verdict, "insufficient");
+  EXPECT_THAT(set_aside(e), UnorderedElementsAreArray(lines)) << explanation_text(e);
 }
 
 }  // namespace
