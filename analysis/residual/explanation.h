@@ -109,8 +109,8 @@ struct Explanation {
   Eigen::MatrixXd residual_before, residual_after;  // n × c, unit of the response
 };
 
-/// The candidates as the data have them: in a table crosstalk from its other axes as well, and where the
-/// response is not in volts no bounds that are. A campaign's are as they came.
+/// The candidates as the data have them: in a table crosstalk from its other axes as well, and bounds that
+/// hold for its response where those of volts or newtons do not. A campaign's are as they came.
 class TableEffects {
  public:
   TableEffects(const Observations& observations, const std::vector<const Effect*>& effects);
