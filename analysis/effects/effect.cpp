@@ -1,6 +1,7 @@
 #include "analysis/effects/effect.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace tunnelrig {
 
@@ -11,6 +12,14 @@ bool Effect::within_time() const {
 
 std::string Effect::cause() const {
   return name == "crosstalk" && !form.empty() ? name + " (" + form + ")" : name;
+}
+
+std::vector<std::size_t> order_of_action(const std::vector<int>& stages) {
+  std::vector<std::size_t> order(stages.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return stages[a] < stages[b]; });
+  return order;
 }
 
 std::optional<std::size_t> Effect::change_point() const {

@@ -51,6 +51,10 @@ struct EffectParameter {
   ParameterRole role = ParameterRole::kAmplitude;
   std::vector<double> grid;      // kShape: where the search begins
   std::optional<double> theory;  // the value that known physics gives it
+
+  // Of what a cell reads: where that is not in volts, or newtons, unit and bounds are others.
+  bool in_volts() const { return unit == "V" || unit.starts_with("V/"); }
+  bool per_newton() const { return unit == "1/N"; }
 };
 
 /// Where an effect acts, and so in which ways it is tried.
@@ -89,6 +93,9 @@ struct Effect {
   /// air, 1 the cell, 2 what scales its reading, 3 what is added to that.
   int stage() const { return additive ? 3 : of_reading ? 2 : scope == EffectScope::kShared ? 0 : 1; }
 };
+
+/// Places of effects of these stages, the first to act first; of one stage in the order given.
+std::vector<std::size_t> order_of_action(const std::vector<int>& stages);
 
 /// Completes a description by its formula: a functor `T operator()(const Sample&, const T* p, const T& F)
 /// const`.

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <optional>
 
 namespace tunnelrig {
@@ -32,18 +31,16 @@ class Forward {
   Forward(const ModelVersion& model, const Observations& observations)
       : model_(model), observations_(observations) {
     Index next = 0;
+    std::vector<int> stages;
     for (const ModelTerm& term : model.terms) {
+      stages.push_back(term.effect->stage());
       first_.push_back(next);
       next += static_cast<Index>(term.parameters.size());
       term_covariates_.emplace_back();
       for (const std::string& name : term.effect->covariates)
         term_covariates_.back().push_back(observations.find(name));
     }
-    order_.resize(model.terms.size());
-    std::iota(order_.begin(), order_.end(), 0U);
-    std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
-      return model.terms[a].effect->stage() < model.terms[b].effect->stage();
-    });
+    order_ = order_of_action(stages);
     for (const ModelCurve& curve : model.curves) {
       first_curve_.push_back(next);
       next += static_cast<Index>(curve.coefficients.size());

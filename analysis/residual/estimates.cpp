@@ -182,10 +182,9 @@ ParameterEstimate summary_of_groups(const EffectParameter& parameter, std::vecto
 }
 
 std::string unit_of(const Observations& observations, const EffectParameter& parameter) {
-  if (observations.from_table && parameter.unit == "1/N")
+  if (observations.from_table && parameter.per_newton())
     return observations.unit == "1" ? "1" : "1/" + observations.unit;
-  const bool volts = parameter.unit == "V" || parameter.unit.starts_with("V/");
-  if (!volts || (observations.newtons_per_volt.array() != 1).any()) return parameter.unit;
+  if (!parameter.in_volts() || (observations.newtons_per_volt.array() != 1).any()) return parameter.unit;
   return observations.unit + parameter.unit.substr(1);
 }
 

@@ -76,17 +76,11 @@ std::string wrapped(const std::string& text) {
   return result + line + "\n";
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 std::string in_words(const AdoptedEffect& a) {
   std::string text = fmt::format("\n  {}   p = {:.3g}\n    {}\n    {}\n", a.term.label(), a.p_value,
                                  a.term.effect->formula, parameters_in_words(a));
   if (!a.confounded_with.empty())
-    text += fmt::format("    not to be told from: {}\n", joined(a.confounded_with));
+    text += fmt::format("    not to be told from: {}\n", fmt::join(a.confounded_with, ", "));
   if (!a.separating_run && !a.confounded_with.empty() && !a.term.per_group)
     text += "    no run within reach would tell them apart\n";
   if (a.separating_run) text += fmt::format("    would tell: {}\n", a.separating_run->text);
@@ -105,7 +99,7 @@ std::string in_words(const UnknownStructure& u, const std::string& unit) {
         "    in proportion to how far {0} is from its mean; drawn as it is where {0} is farthest\n", u.times);
   if (u.levels) text += wrapped("  " + levels_in_words(u, unit));
   if (!u.instead_of.empty())
-    text += fmt::format("    in which it bends away from the formula of {}\n", joined(u.instead_of));
+    text += fmt::format("    in which it bends away from the formula of {}\n", fmt::join(u.instead_of, ", "));
   return text;
 }
 
@@ -117,7 +111,7 @@ std::string errors_in_words(const Explanation& e) {
       e.before.held_out_high, e.after.held_out_rmse, e.after.held_out_low, e.after.held_out_high,
       e.noise_floor);
   if (!e.empirical.empty())
-    text += fmt::format("after is with the empirical curve over {}\n", joined(e.empirical));
+    text += fmt::format("after is with the empirical curve over {}\n", fmt::join(e.empirical, ", "));
   return text;
 }
 
@@ -130,11 +124,12 @@ std::string in_words(const std::vector<Untestable>& untestable) {
     if (u.missing.empty())
       by_reason[u.reason].push_back(u.effect);
     else
-      not_recorded.push_back(fmt::format("{} ({})", u.effect, joined(u.missing)));
+      not_recorded.push_back(fmt::format("{} ({})", u.effect, fmt::join(u.missing, ", ")));
   std::string text = "\nnot testable with these data:\n";
   for (const auto& [reason, effects] : by_reason)
-    text += wrapped(fmt::format("{}: {}", reason, joined(effects)));
-  if (!not_recorded.empty()) text += wrapped("its condition was not recorded: " + joined(not_recorded));
+    text += wrapped(fmt::format("{}: {}", reason, fmt::join(effects, ", ")));
+  if (!not_recorded.empty())
+    text += wrapped(fmt::format("its condition was not recorded: {}", fmt::join(not_recorded, ", ")));
   return text;
 }
 

@@ -50,14 +50,15 @@ double sigma_by_median(const VectorXd& sizes) {
 }
 
 /// Several gross rows hide each other in the variance: of n rows, k alike are hardly beyond √(n/k) of it. But
-/// they lie apart. Residuals of a table's rows, each from its group's median, in σ by the median size
-/// of all, where these are the farthest (at most one of ten): beyond 10, and twice as far as the next; 0
-/// elsewhere. The tails of a distribution, or of a group that scatters more, have no such gap.
+/// they lie apart. Residuals of a table's rows, each from its group's median, in σ by the median size of all,
+/// where these are the farthest (at most one of ten): beyond 10, and twice as far as the next; 0 elsewhere,
+/// and for campaigns. The tails of a distribution, or of a group that scatters more, have no such gap.
 VectorXd distance_of_those_apart(const Observations& observations, const std::vector<int>& rows,
                                  const VectorXd& residual) {
   constexpr double kFar = 10, kGap = 2;
   constexpr std::size_t kFewestOfGroup = 5;
   VectorXd away = VectorXd::Zero(residual.size());
+  if (!observations.from_table) return away;
   for (auto& [group, members] : places_of_each(observations.group, rows)) {
     std::erase_if(members, [&](Index r) { return !std::isfinite(residual(r)); });
     if (members.empty()) continue;
@@ -93,13 +94,11 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
       }
       left(r, c) = std::max(2 - std::pow(errors.expected_std(r, c) / unit, 2) / sigma2(r, c), kLeastLeft);
     }
-  VectorXd apart = VectorXd::Zero(residual.rows());
-  if (observations.from_table) apart = distance_of_those_apart(observations, errors.rows, residual.col(0));
+  VectorXd apart = distance_of_those_apart(observations, errors.rows, residual.col(0));
   residual.array() /= sigma2.array().sqrt();
   // A gross row under a rare condition may have been taken for scatter that goes with it, and others for
   // none.
-  if (observations.from_table && apart.isZero(0))
-    apart = distance_of_those_apart(observations, errors.rows, residual.col(0));
+  if (apart.isZero(0)) apart = distance_of_those_apart(observations, errors.rows, residual.col(0));
   const auto missing = residual.array().isNaN();
   const double variance = missing.select(0, residual).squaredNorm() / missing.select(0, left).sum();
   const double limit = student_t_quantile(

@@ -37,10 +37,6 @@ std::vector<Effect> other_axes(const Observations& observations) {
   return effects;
 }
 
-bool is_in_volts(const EffectParameter& parameter) {
-  return parameter.unit == "V" || parameter.unit.starts_with("V/");
-}
-
 void bound_by(double limit, EffectParameter& parameter) {
   if (parameter.lower < 0) parameter.lower = -limit;
   if (parameter.upper > 0) parameter.upper = limit;
@@ -54,8 +50,8 @@ std::optional<Effect> bounded_as_here(const Effect& effect, const Observations& 
   Effect own = effect;
   bool differs = false;
   for (EffectParameter& parameter : own.parameters) {
-    const bool in_volts = is_in_volts(parameter) && observations.unit != "V";
-    const bool per_newton = parameter.unit == "1/N" && observations.unit != "N";
+    const bool in_volts = parameter.in_volts() && observations.unit != "V";
+    const bool per_newton = parameter.per_newton() && observations.unit != "N";
     if (in_volts) bound_by(kNoBound, parameter);
     if (per_newton)
       bound_by(kMostBent / (observations.value.maxCoeff() - observations.value.minCoeff()), parameter);

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <optional>
 #include <set>
 
@@ -248,12 +247,9 @@ std::vector<double> reference_of(const Effect& effect, const Observations& obser
 }
 
 std::vector<std::size_t> order_of_action(const std::vector<Term>& terms) {
-  std::vector<std::size_t> order(terms.size());
-  std::iota(order.begin(), order.end(), 0U);
-  const auto stage = [&](std::size_t t) { return terms[t].per_group ? -1 : terms[t].effect->stage(); };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return stage(a) < stage(b); });
-  return order;
+  std::vector<int> stages;
+  for (const Term& term : terms) stages.push_back(term.per_group ? -1 : term.effect->stage());
+  return order_of_action(stages);
 }
 
 Testability testability(const Effect& effect, const Observations& observations) {

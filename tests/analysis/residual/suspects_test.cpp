@@ -80,10 +80,11 @@ TEST_F(Mistyped, GapsOfADistanceAreNoValues) {
 }
 
 struct GrossRowsTest : test::TablesTest {
-  /// Thrust over speed with a Reynolds number's 0.1 and 1 % of scatter; each of `wrong` multiplies one of the
-  /// fastest rows, one of five. Lines of the rows that are wrong.
   std::string csv;
-  std::vector<std::string> lines;
+  std::vector<std::string> lines;  // of the rows that are wrong
+
+  /// Thrust over speed with a Reynolds number's 0.1 and 1 % of scatter; each of `wrong` multiplies one of the
+  /// fastest rows, one of five.
   void write_thrusts(const std::vector<double>& wrong, int blocks = 12) {
     std::vector<double> rpm(96);
     for (double& each : rpm) each = 2000 + 6000 * even(random);
