@@ -52,9 +52,12 @@ class Root {
         correlation_(run_correlation),
         scale_(1 / std::sqrt(1 - run_correlation * run_correlation)),
         w_(inverse_scatter_) {
+    squared_norm_.reserve(blocks.size());
+    share_.reserve(blocks.size());
     for (const auto& runs : blocks_) {
       foretell(runs, w_);
-      const double squared_norm = w_(runs).squaredNorm();
+      double squared_norm = 0;
+      for (const Index run : runs) squared_norm += w_(run) * w_(run);
       squared_norm_.push_back(squared_norm);
       share_.push_back((1 - 1 / std::sqrt(1 + session_ratio * squared_norm)) / squared_norm);
     }
@@ -69,7 +72,7 @@ class Root {
   void apply(Eigen::Ref<MatrixXd> columns) const {
     columns.array().colwise() *= inverse_scatter_.array();
     for (Index c = 0; c < columns.cols(); ++c)
-      for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      for (std::size_t b = 0; b < blocks_.size() && mixes(); ++b) {
         foretell(blocks_[b], columns.col(c));
         shrink(b, columns.col(c));
       }
@@ -77,7 +80,7 @@ class Root {
 
   void apply_transposed(Eigen::Ref<MatrixXd> columns) const {
     for (Index c = 0; c < columns.cols(); ++c)
-      for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      for (std::size_t b = 0; b < blocks_.size() && mixes(); ++b) {
         const auto& runs = blocks_[b];
         shrink(b, columns.col(c));
         for (std::size_t k = 0; k < runs.size() && correlation_ != 0; ++k) {
@@ -89,6 +92,7 @@ class Root {
   }
 
  private:
+  bool mixes() const { return session_ratio_ != 0 || correlation_ != 0; }  // the runs of a block
   void foretell(const std::vector<Index>& runs, Eigen::Ref<VectorXd> column) const {
     for (std::size_t k = runs.size() - 1; k > 0 && correlation_ != 0; --k)
       column(runs[k]) = scale_ * (column(runs[k]) - correlation_ * column(runs[k - 1]));

@@ -169,10 +169,13 @@ class Search {
   /// What an effect goes by: its covariates; with `power:COLUMN` that column for a function of the force
   /// alone, because a bend there is as likely the law's as the cell's.
   std::vector<std::string> conditions_of(const Effect& effect) const;
-  /// Of what an effect makes of its conditions, the share that does not go with what the curve is over.
-  double share_beside(const Curve& curve, const Term& term) const;
+  /// Of what an effect makes of its conditions, `made` per unit of its amplitude on top of `predicted`, the
+  /// share that does not go with what the curve is over.
+  double share_beside(const Curve& curve, const Term& term, const Eigen::MatrixXd& made,
+                      const Eigen::MatrixXd& predicted) const;
   /// Whether a curve does nearly all that an effect's conditions do, so that a name beside it means nothing.
-  bool is_work_of_a_curve(const Term& term) const;
+  bool is_work_of_a_curve(const Term& term, const Eigen::MatrixXd& made,
+                          const Eigen::MatrixXd& predicted) const;
   /// Of which rotor; −1: of what several do; nothing where it is not.
   std::optional<int> session_scatter_is_large() const;
 

@@ -160,10 +160,10 @@ std::vector<std::string> Search::conditions_of(const Effect& effect) const {
   return {observations_.baseline_over};
 }
 
-double Search::share_beside(const Curve& curve, const Term& term) const {
+double Search::share_beside(const Curve& curve, const Term& term, const Eigen::MatrixXd& made,
+                            const Eigen::MatrixXd& predicted) const {
   const Eigen::Index channel = std::max(term.rotor, 0), of_curve = curve.x.cols() > 1 ? channel : 0;
-  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
-  const Eigen::VectorXd column = respond(term, observations_, predicted).derivative[0][0](rows_, channel);
+  const Eigen::VectorXd column = made(rows_, channel);
   const auto share = [&](const Eigen::VectorXd& of) {
     return share_beside_cubics(observations_, rows_, {curve.x(rows_, of_curve)}, of);
   };
@@ -173,14 +173,15 @@ double Search::share_beside(const Curve& curve, const Term& term) const {
   return std::min(share(column), of_force.allFinite() ? share(of_force) : 1.0);
 }
 
-bool Search::is_work_of_a_curve(const Term& term) const {
+bool Search::is_work_of_a_curve(const Term& term, const Eigen::MatrixXd& made,
+                                const Eigen::MatrixXd& predicted) const {
   constexpr double kLittle = 0.1;  // of its variance
   const auto names = conditions_of(*term.effect);
   return !term.per_group &&
          std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
            return found.curve.everywhere() && found.curve.tilt.empty() && found.curve.rotor == term.rotor &&
                   found.curve.x.size() > 0 && is_over(found.curve, names) &&
-                  share_beside(found.curve, term) < kLittle;
+                  share_beside(found.curve, term, made, predicted) < kLittle;
          });
 }
 

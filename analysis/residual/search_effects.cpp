@@ -66,9 +66,10 @@ Search::Scan Search::list_effects(const JointFit& base) const {
   Scan scan;
   const Eigen::MatrixXd predicted = predict_response(observations_, base.model, rows_);
   for (const Term& way : ways_) {
-    if (already_in(way, base.model) || is_work_of_a_curve(way)) continue;
+    if (already_in(way, base.model)) continue;
     Candidate candidate = candidate_of(way, predicted);
-    if (!mixed_->sees(candidate.columns[0])) continue;
+    const Components& column = candidate.columns[0];
+    if (is_work_of_a_curve(way, column[0], predicted) || !mixed_->sees(column)) continue;
     scan.ways.push_back(way);
     scan.candidates.push_back(std::move(candidate));
   }
