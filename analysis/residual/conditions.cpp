@@ -222,7 +222,24 @@ std::string wilder_runs(const Observations& observations) {
                      scatter.maxCoeff());
 }
 
+/// "what rotors 1 and 4 differ by from 2 and 3 scatters 2.9 times as much as …"
+std::string unlike_contrasts(const Observations& observations) {
+  const Eigen::MatrixXd modes =
+      MixedModel::baseline_alone(observations, observations.all_rows()).mode_matrix();
+  std::vector<std::string> contrasts;
+  for (Eigen::Index k = 0; k < observations.scatter.contrasts.size(); ++k) {
+    std::array<std::vector<int>, 2> sides;
+    for (int rotor = 0; rotor < 4; ++rotor) sides[modes(rotor, k + 1) > 0 ? 0 : 1].push_back(rotor + 1);
+    contrasts.push_back(fmt::format("{} − {}: {:.2f}", fmt::join(sides[0], " + "), fmt::join(sides[1], " − "),
+                                    observations.scatter.contrasts(k)));
+  }
+  return fmt::format("differences of rotors scatter unlike each other (over their geometric mean, rotors {})",
+                     fmt::join(contrasts, ", "));
+}
+
 void warn_of_scatter(const Observations& observations, Explanation& explanation) {
+  if (observations.scatter.contrasts.size() > 0)
+    explanation.warnings.push_back(unlike_contrasts(observations) + ": allowed for");
   if (observations.scatter.rotors.size() > 0)
     explanation.warnings.push_back(
         fmt::format("rotors scatter unlike each other (over their geometric mean: {:.2f}): allowed for",

@@ -31,18 +31,19 @@ using Data = ScanProducts::Data;
 struct CandidateScan::Impl {
   const MixedModel& model;
   std::vector<Candidate> candidates;
-  const Index adopted;
   const ScanProducts columns;
+  const Index adopted, all_adopted;  // beside the candidates; with those that were taken out of all
   std::map<std::pair<int, Index>, EvidenceTable> tables;
   std::vector<const EvidenceTable*> table_of;
 
   Impl(const MixedModel& m, const std::vector<Components>& adopted_columns, const std::vector<Candidate>& all)
       : model(m),
         candidates(all),
-        adopted(static_cast<Index>(adopted_columns.size())),
-        columns(m, adopted_columns, candidates) {
+        columns(m, adopted_columns, candidates),
+        adopted(columns.adopted()),
+        all_adopted(static_cast<Index>(adopted_columns.size())) {
     for (std::size_t i = 0; i < candidates.size(); ++i) {
-      if (adopted + static_cast<Index>(candidates[i].columns.size()) > kMostColumns)
+      if (all_adopted + static_cast<Index>(candidates[i].columns.size()) > kMostColumns)
         throw std::length_error(fmt::format("a model of more than {} columns", kMostColumns));
       table_of.push_back(table_for(i));
     }
@@ -53,7 +54,7 @@ struct CandidateScan::Impl {
     for (std::size_t s = 0; s < model.strata().size(); ++s)
       if (columns.touches(i, s)) observations += model.dof(s);
     const int own = static_cast<int>(candidates[i].columns.size());
-    observations = std::max<Index>(observations - adopted, own + 2);
+    observations = std::max<Index>(observations - all_adopted, own + 2);
     return &tables.try_emplace({own, observations}, own, static_cast<double>(observations)).first->second;
   }
 
@@ -142,7 +143,8 @@ struct CandidateScan::Impl {
         const std::size_t ratio = state.ratio[s];
         const double own = columns.products(s, ratio).candidate[candidate](0, 0);
         const double squares = data[s][ratio].squares(set), with = data[s][ratio].columns(column, set);
-        state.rss[s] = std::max(squares - amplitude * (2 * with - amplitude * own), 1e-12 * squares);
+        state.rss[s] =
+            std::max(squares - amplitude * (2 * with - amplitude * own), data[s][ratio].least(set));
       }
     }
   }
@@ -181,7 +183,7 @@ struct CandidateScan::Impl {
   /// Degrees of freedom that the adopted columns take of one stratum: its part of the trace of their hat
   /// matrix.
   double spent(const Data& data, const State& state, std::size_t stratum) const {
-    if (adopted == 0) return 0;
+    if (adopted == 0) return static_cast<double>(columns.taken_out());
     SmallMatrix all = SmallMatrix::Zero(adopted, adopted), own = all;
     SmallVector unused = SmallVector::Zero(adopted);
     for (std::size_t s = 0; s < model.strata().size(); ++s) {
@@ -196,9 +198,9 @@ struct CandidateScan::Impl {
     SmallMatrix a(state.amplitude.size(), state.amplitude.size());
     SmallVector b(state.amplitude.size());
     normal_equations(data, set, candidate, s, state, a, b);
-    const double squares = data[s][state.ratio[s]].squares(set);
-    return std::max(squares - 2 * state.amplitude.dot(b) + state.amplitude.dot(a * state.amplitude),
-                    1e-12 * squares);
+    const ScanProducts::DataProducts& y = data[s][state.ratio[s]];
+    return std::max(y.squares(set) - 2 * state.amplitude.dot(b) + state.amplitude.dot(a * state.amplitude),
+                    y.least(set));
   }
 
   /// Ratios one stratum after the other, each at its best with the others held.
@@ -276,7 +278,8 @@ struct CandidateScan::Impl {
         const double own =
             columns.touches(candidate, s) ? columns.products(s, ratio).candidate[candidate](0, 0) : 0;
         const double with = data[s][ratio].columns(column, set);
-        result[s].push_back({data[s][ratio].squares.segment(set, 1), data[s][ratio].columns.col(set)});
+        const ScanProducts::DataProducts& y = data[s][ratio];
+        result[s].push_back({y.squares.segment(set, 1), y.least.segment(set, 1), y.columns.col(set)});
         result[s][ratio].squares(0) += amplitude * (2 * with + amplitude * own);
         result[s][ratio].columns(column, 0) += amplitude * own;
       }

@@ -128,7 +128,9 @@ MixedModel MixedModel::baseline_alone(const Observations& observations, std::vec
   return {observations,
           std::move(rows),
           {0},
-          {.rotors = observations.scatter.rotors, .sessions = observations.scatter.sessions}};
+          {.rotors = observations.scatter.rotors,
+           .contrasts = observations.scatter.contrasts,
+           .sessions = observations.scatter.sessions}};
 }
 
 MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
@@ -141,7 +143,8 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
       scatter_(scatter.of_runs(rows_)) {
   if (modes_(0, 0) < 0) modes_ *= -1;
   rotors_of_modes_ = scatter.rotors_differ() ? MatrixXd(modes_.inverse()) : modes_.transpose();
-  const int channels = static_cast<int>(observations.channels()), alone = scatter.sessions.alone;
+  const int channels = static_cast<int>(observations.channels()),
+            alone = scatter.contrasts.size() > 0 ? channels : scatter.sessions.alone;
   for (std::size_t component = 0; component <= observations.shape.size(); ++component) {
     for (int mode = 0; mode < alone; ++mode) strata_.push_back({component, mode, 1});
     if (channels > alone) strata_.push_back({component, alone, channels - alone});

@@ -3,11 +3,11 @@
 //   y = (group's constant, free per rotor) + terms + session + run
 //
 // The rotors' y are rotated into one common and c − 1 difference modes (each rotor's first divided by its
-// scatter, where they differ in it; of rotors whose sessions differ more, each has a mode of its own); the
-// runs' means and each cosine coefficient of their course, common or difference, make a stratum with a run
-// variance σ² and a session variance a σ² of its own. A run's mean may be correlated with that of the run
-// before it by φ, and scatter d times as much as most: V = σ² (DΦD + a 11ᵀ) in each session, Φ_ij =
-// φ^|i − j|, D = diag(d). docs/closed-loop.md has the equations.
+// scatter, where they differ in it; of rotors whose sessions differ more, each has a mode of its own, and so
+// have contrasts that scatter unlike each other); the runs' means and each cosine coefficient of their
+// course, common or difference, make a stratum with a run variance σ² and a session variance a σ² of its own.
+// A run's mean may be correlated with that of the run before it by φ, and scatter d times as much as most: V
+// = σ² (DΦD + a 11ᵀ) in each session, Φ_ij = φ^|i − j|, D = diag(d). docs/closed-loop.md has the equations.
 #pragma once
 
 #include "analysis/residual/terms.h"

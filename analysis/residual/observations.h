@@ -89,6 +89,9 @@ struct RunScatter {
   std::array<double, 2> run_correlation = {0, 0};
   /// Each rotor's own over their geometric mean; empty: alike (rotor_scatter.h).
   Eigen::VectorXd rotors = {};
+  /// Each contrast's of four rotors over their geometric mean, which is each a stratum of its own then;
+  /// empty: alike (contrast_scatter.h).
+  Eigen::VectorXd contrasts = {};
   RotorSessions sessions = {};
   /// n: each run's over that of most, by location and session; empty: alike (run_scatter.h).
   Eigen::VectorXd runs = {};
@@ -98,7 +101,7 @@ struct RunScatter {
     Eigen::VectorXd runs = {};
   } by_condition = {};
 
-  bool rotors_differ() const { return rotors.size() > 0 || !sessions.rotors.empty(); }
+  bool rotors_differ() const { return rotors.size() > 0 || contrasts.size() > 0 || !sessions.rotors.empty(); }
   /// Of some runs, by all of these; 1 where all are alike.
   Eigen::VectorXd of_runs(const std::vector<int>& rows) const;
   RunScatter subset(const std::vector<int>& kept) const;

@@ -29,6 +29,41 @@ ScanProducts::ScanProducts(const MixedModel& model, const std::vector<Components
     touches_.emplace_back();
     for (const MatrixXd& own : products_[s][0].candidate) touches_[s].push_back(own.trace() > 0);
   }
+  if (strata == 1 && adopted_ > 0) take_out_adopted();
+}
+
+void ScanProducts::take_out_adopted() {
+  constexpr double kRidge = 1e-12, kLeast = 1e-300;  // a sum of the adopted leaves nothing
+  const Index q = adopted_;
+  taken_out_ = products_[0][0].adopted_adopted.completeOrthogonalDecomposition().rank();
+  for (Products& products : products_[0]) {
+    MatrixXd normal = products.adopted_adopted;
+    normal.diagonal() = normal.diagonal().array() * (1 + kRidge) + kLeast;
+    normal_of_adopted_.emplace_back(normal);
+    const MatrixXd on_adopted = normal_of_adopted_.back().solve(products.adopted_candidate);
+    for (std::size_t i = 0; i < products.candidate.size(); ++i) {
+      MatrixXd& own = products.candidate[i];
+      own.diagonal() *= 1 + kRidge;
+      own -= products.adopted_candidate.middleCols(first_[i], own.cols()).transpose() *
+             on_adopted.middleCols(first_[i], own.cols());
+    }
+    products.adopted_adopted.resize(0, 0);
+    on_adopted_.emplace_back(on_adopted.rightCols(all_ - q));
+    products.adopted_candidate.resize(0, all_ - q);
+  }
+  for (Index& first : first_) first -= q;
+  adopted_ = 0;
+}
+
+void ScanProducts::take_out_adopted(std::vector<DataProducts>& data) const {
+  for (std::size_t ratio = 0; ratio < data.size(); ++ratio) {
+    auto& [squares, least, columns] = data[ratio];
+    const Index q = normal_of_adopted_[ratio].rows();
+    const MatrixXd adopted = columns.topRows(q);
+    squares -= adopted.cwiseProduct(normal_of_adopted_[ratio].solve(adopted)).colwise().sum().transpose();
+    squares = squares.cwiseMax(least).eval();
+    columns = (columns.bottomRows(columns.rows() - q) - on_adopted_[ratio].transpose() * adopted).eval();
+  }
 }
 
 void ScanProducts::project(std::size_t stratum, const std::vector<const Components*>& items) {
@@ -84,6 +119,7 @@ ScanProducts::Data ScanProducts::times(const std::vector<Stacked>& data) const {
   for (std::size_t s = 0; s < data.size(); ++s)
     for (DataProducts& products : result[s]) {
       products.squares.resize(data[s].cols());
+      products.least.resize(data[s].cols());
       products.columns = MatrixXd::Zero(all_, data[s].cols());
     }
   in_two_threads(2 * data.size(), [&](std::size_t k) {  // half of a stratum's data sets
@@ -94,11 +130,13 @@ ScanProducts::Data ScanProducts::times(const std::vector<Stacked>& data) const {
     else
       multiply(k / 2, sets.rightCols(sets.cols() - half), half, result[k / 2]);
   });
+  if (!normal_of_adopted_.empty()) take_out_adopted(result[0]);
   return result;
 }
 
 void ScanProducts::multiply(std::size_t stratum, Stacked sets, Index from,
                             std::vector<DataProducts>& result) const {
+  constexpr double kRounding = 1e-12;
   model_.project(stratum, 0, sets);
   const SessionDirections& sessions = sessions_[stratum];
   const Stacked in_sessions = sessions.coordinates(sets);
@@ -106,8 +144,9 @@ void ScanProducts::multiply(std::size_t stratum, Stacked sets, Index from,
   const MatrixXd columns = projected_[stratum].transpose() * sets;
   for (std::size_t ratio = 0; ratio < model_.ratios(); ++ratio) {
     const Stacked weighted = sessions.weights(kRatios[ratio]).asDiagonal() * in_sessions;
-    result[ratio].squares.segment(from, sets.cols()) =
-        squares - weighted.cwiseProduct(in_sessions).colwise().sum().transpose();
+    auto own = result[ratio].squares.segment(from, sets.cols());
+    own = squares - weighted.cwiseProduct(in_sessions).colwise().sum().transpose();
+    result[ratio].least.segment(from, sets.cols()) = kRounding * own;
     result[ratio].columns(used_[stratum], Eigen::seqN(from, sets.cols())) =
         columns - by_session_[stratum].transpose() * weighted;
   }

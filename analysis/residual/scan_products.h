@@ -9,7 +9,9 @@
 
 namespace tunnelrig {
 
-/// Adopted columns first (q), then all candidates' (K in all); projected by the model.
+/// Adopted columns first (q), then all candidates' (K in all); projected by the model. In a model of one
+/// stratum its σ is no weight, and all are what they are beside the adopted ones at once (Frisch & Waugh
+/// 1933), of which none is left then (q = 0).
 class ScanProducts {
  public:
   /// Of one stratum at one ratio.
@@ -22,6 +24,7 @@ class ScanProducts {
   /// Likewise, with data sets.
   struct DataProducts {
     Eigen::VectorXd squares;  // of each data set
+    Eigen::VectorXd least;    // of them that rounding may leave of a perfect fit
     Eigen::MatrixXd columns;  // (q + K) × data sets
   };
   using Data = std::vector<std::vector<DataProducts>>;  // stratum, ratio
@@ -33,6 +36,9 @@ class ScanProducts {
   /// With stacked data sets of each stratum, a column each.
   Data times(const std::vector<Stacked>& data) const;
 
+  Eigen::Index adopted() const { return adopted_; }  // q
+  /// Adopted columns that are no sum of others, where they were taken out.
+  Eigen::Index taken_out() const { return taken_out_; }
   const Products& products(std::size_t stratum, std::size_t ratio) const { return products_[stratum][ratio]; }
   Eigen::Index first(std::size_t candidate) const { return first_[candidate]; }  // of its columns
 
@@ -47,9 +53,15 @@ class ScanProducts {
   std::vector<Products> multiply(std::size_t stratum, const std::vector<Candidate>& candidates) const;
   void multiply(std::size_t stratum, Stacked sets, Eigen::Index from,
                 std::vector<DataProducts>& result) const;
+  void take_out_adopted();
+  void take_out_adopted(std::vector<DataProducts>& data) const;
 
   const MixedModel& model_;
   Eigen::Index adopted_, all_ = 0;  // q; q + K
+  Eigen::Index taken_out_ = 0;
+  /// Of those that were taken out, by ratio; what of each candidate's column goes with them.
+  std::vector<Eigen::LDLT<Eigen::MatrixXd>> normal_of_adopted_;
+  std::vector<Eigen::MatrixXd> on_adopted_;
   std::vector<Eigen::Index> first_;
   /// Of each stratum those that are not 0 there: few effects change a run's course.
   std::vector<std::vector<Eigen::Index>> used_;

@@ -1,4 +1,5 @@
 // What runs scatter like, beside what the search has found so far; and the search begun again with it.
+#include "analysis/residual/contrast_scatter.h"
 #include "analysis/residual/rotor_scatter.h"
 #include "analysis/residual/rotor_sessions.h"
 #include "analysis/residual/run_correlation.h"
@@ -44,7 +45,8 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
   const RunScatter& before = observations_.scatter;
   const bool known = before.rotors_differ();
   std::mt19937_64 random(settings_.seed * 1000003 + 3000), other(settings_.seed * 1000003 + 4000),
-      third(settings_.seed * 1000003 + 5000), fourth(settings_.seed * 1000003 + 6000);
+      third(settings_.seed * 1000003 + 5000), fourth(settings_.seed * 1000003 + 6000),
+      fifth(settings_.seed * 1000003 + 7000);
   // While a rotor that scatters more was taken for one like the others, the best curve had a part of its
   // scatter.
   const ScatterBeside beside = scatter_beside(curves, known ? critical_ : 0, third);
@@ -56,14 +58,19 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
     return without(y, of, fit_amplitudes(scattered, y, of, beside.scatter.variances, rows_).amplitude);
   };
   const Components residual = left_beside(columns);
-  scatter.rotors = rotor_scatter(scattered, rows_, residual, other);
+  // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter.
+  const Eigen::VectorXd contrasts = contrast_scatter(scattered, rows_, residual, fifth);
+  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, rows_, residual, other);
   const MixedModel model(scattered, rows_);
   const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);
   scatter.run_correlation = run_correlation(model, variances, residual, random);
   scatter.runs = run_scatter(observations_, run_sizes(model, variances, y, columns, third));
   // The best of many curves makes half of what a dozen sessions differ by, whatever that is.
-  scatter.sessions = rotor_sessions(scattered, rows_, left_beside(fit_.linear.columns), fourth);
-  if (are_alike(scatter.rotors, before.rotors) && scatter.sessions.rotors == before.sessions.rotors &&
+  if (contrasts.size() == 0)
+    scatter.sessions = rotor_sessions(scattered, rows_, left_beside(fit_.linear.columns), fourth);
+  scatter.contrasts = contrasts;  // after what takes the differences for one stratum
+  if (are_alike(scatter.rotors, before.rotors) && are_alike(contrasts, before.contrasts) &&
+      scatter.sessions.rotors == before.sessions.rotors &&
       (before.runs.size() > 0) == (scatter.runs.size() > 0) &&
       before.by_condition.names == scatter.by_condition.names &&
       (known || scatter.run_correlation == before.run_correlation))

@@ -99,19 +99,32 @@ TEST(Likelihood, RatioOfACandidateIsTheDenseOne) {
   }
 }
 
+/// Adopted columns are the model's, whatever sessions scatter like; also where one is a sum of others.
 TEST(Likelihood, AdoptedColumnsStayIn) {
   std::mt19937_64 random(test::seed() + 2);
-  const Observations o = test::simulate({.session_ratio = 0}, random);
-  const MatrixXd columns = normal_matrix(o.rows(), 2, random);
-  const MixedModel model(o, o.all_rows(), {});
-  const Components first = {columns.col(0)}, second = {columns.col(1)};
-  const CandidateScan scan(model, {first}, {{.columns = {second}}});
-  const NullFit null = scan.null_fit({o.y});
-  const DenseFit without = dense_fit(o, o.y.col(0), columns.col(0), kRatios[null.ratio[0]]);
-  EXPECT_NEAR(null.log_likelihood, without.log_likelihood, 1e-8);
-  const DenseFit with = dense_fit(o, o.y.col(0), columns, kRatios[null.ratio[0]]);
-  if (null.ratio[0] == 0) {
-    EXPECT_NEAR(scan.fit({o.y})[0].likelihood_ratio, with.log_likelihood - without.log_likelihood, 1e-7);
+  for (int i = 0; i < 30; ++i) {
+    Observations o =
+        test::simulate({.runs_of_block = {3, 6, 4, 8, 5, 2, 7, 5}, .session_ratio = 0.2 * (i % 12)}, random);
+    const MatrixXd columns = normal_matrix(o.rows(), 4, random);
+    test::set_y(o, o.y + columns * VectorXd::Constant(4, 0.0007 * (i % 5)));
+    std::vector<Components> adopted = {{columns.col(0)}, {columns.col(1)}};
+    if (i % 2 == 1) adopted.push_back({columns.col(0) - 2 * columns.col(1)});
+    const MixedModel model(o, o.all_rows());
+    const CandidateScan scan(
+        model, adopted, {{.columns = {{columns.col(2)}}}, {.columns = {{columns.col(2)}, {columns.col(3)}}}});
+    const NullFit null = scan.null_fit({o.y});
+    const DenseFit without = best_of(o, o.y.col(0), columns.leftCols(2), 0, kRatios.size() - 1);
+    EXPECT_NEAR(null.log_likelihood, without.log_likelihood, 1e-7);
+    const double spent = static_cast<double>(model.dof(0)) / static_cast<double>(model.dof(0) - 2);
+    EXPECT_NEAR(null.sigma[0], without.sigma * std::sqrt(spent), 1e-9);
+    const std::size_t start = null.ratio[0], lowest = start > 4 ? start - 4 : 0;
+    const auto fits = scan.fit({o.y});
+    for (Index k = 1; k <= 2; ++k) {
+      const DenseFit with = best_of(o, o.y.col(0), columns.leftCols(2 + k), lowest, start);
+      const CandidateFit& fit = fits[static_cast<std::size_t>(k - 1)];
+      EXPECT_NEAR(fit.likelihood_ratio, std::max(0.0, with.log_likelihood - null.log_likelihood), 1e-6);
+      EXPECT_LT((fit.amplitude - with.amplitude.tail(k)).norm(), 1e-8);
+    }
   }
 }
 

@@ -1,4 +1,5 @@
 // Scatter that is not the same everywhere: a rotor's own, and runs that belong to no scatter.
+#include "analysis/residual/contrast_scatter.h"
 #include "analysis/residual/explanation_output.h"
 #include "analysis/residual/explanation_parts.h"
 #include "analysis/residual/rotor_scatter.h"
@@ -51,6 +52,62 @@ TEST_F(Scatter, ModesMakeRotorsAlike) {
   EXPECT_GT(alike(0), 0);
   EXPECT_LT(alike.tail(3).cwiseAbs().maxCoeff(), 1e-12);
   EXPECT_LT((modes * model.rotors_of_modes() - MatrixXd::Identity(4, 4)).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+/// A roll that differs from run to run: rotors 1 and 4 against 2 and 3, in σ of a rotor's own scatter.
+void let_roll(Observations& o, double times, std::mt19937_64& random) {
+  std::normal_distribution<double> normal(0, times * kRunSigma);
+  const Eigen::RowVector4d sides(1, -1, -1, 1);
+  MatrixXd y = o.y;
+  for (Index row = 0; row < y.rows(); ++row) y.row(row) += normal(random) * sides;
+  test::set_y(o, y);
+}
+
+TEST_F(Scatter, OfARollIsFoundAndIsNotThatOfRotors) {
+  constexpr int kCampaigns = 40;
+  int alike_differ = 0, of_a_rotor = 0, found_of_roll = 0;
+  for (int i = 0; i < kCampaigns; ++i) {
+    Observations o = observations(), one_rotor = o;
+    const auto unlike = [&](const Observations& of) {
+      return contrast_scatter(of, of.all_rows(), {of.y}, random);
+    };
+    alike_differ += unlike(o).size() > 0 ? 1 : 0;
+    let_scatter_more(one_rotor, 2, 4);
+    of_a_rotor += unlike(one_rotor).size() > 0 ? 1 : 0;
+    let_roll(o, 1.5, random);
+    const VectorXd scatter = unlike(o);
+    if (scatter.size() == 0) continue;
+    ++found_of_roll;
+    EXPECT_NEAR(scatter.prod(), 1, 1e-9);
+    EXPECT_NEAR(scatter(2) / std::sqrt(scatter(0) * scatter(1)), std::sqrt(1 + 4 * 1.5 * 1.5), 1);
+  }
+  EXPECT_LE(alike_differ, 3) << "0.5 % of 40 are expected";
+  EXPECT_LE(of_a_rotor, 3);
+  EXPECT_EQ(found_of_roll, kCampaigns);
+}
+
+TEST_F(Scatter, OfARollIsSaidAndIsNoStructure) {
+  Observations o = observations();
+  let_roll(o, 1.5, random);
+  const Explanation e = explained(o);
+  EXPECT_EQ(e.verdict, "no_structure");
+  EXPECT_THAT(e.warnings, testing::Contains(testing::HasSubstr("1 + 4 − 2 − 3: 2.")));
+  EXPECT_THAT(e.warnings, testing::Each(testing::Not(testing::StartsWith("rotors scatter"))));
+  EXPECT_GT(without_set_aside(o, e).scatter.contrasts.size(), 0)
+      << "a model that is adopted is fitted with it";
+}
+
+/// What the roll drowns in a common scatter of all differences stands out beside it in the others.
+TEST_F(Scatter, OfARollDoesNotHideWhatIsElsewhere) {
+  Observations o = observations();
+  let_roll(o, 3, random);
+  const VectorXd voltage = o.find("supply_voltage_V")->value.col(0);
+  MatrixXd y = o.y;
+  y.leftCols(2).array().colwise() += 1.2 * kRunSigma * (voltage.array() - 16);
+  y.rightCols(2).array().colwise() -= 1.2 * kRunSigma * (voltage.array() - 16);
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  EXPECT_FALSE(e.adopted.empty() && e.unknown.empty());
 }
 
 /// Of the third rotor, over the others' geometric mean.
