@@ -47,11 +47,14 @@ void warn_of_tares(const Observations& observations, const MeanModel& model, Exp
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
 
+/// By what is adopted and unknown, where there were blocks enough.
+std::string verdict_of(const Explanation& explanation);
+
 // --- incomplete_conditions.cpp
 
-/// Holds what was found against the runs that have all conditions of which some runs lack a value. Where
-/// these say that it is the work of such a condition, names that they do not confirm are taken back, and it
-/// is `said`.
+/// Holds what was found, or nothing, against the runs that have conditions of which others lack a value. What
+/// goes with such a condition there is unknown structure, since no name of it can be held against all runs;
+/// names that these runs do not confirm are taken back; and it is `said`.
 Explanation without_names_of_incomplete(Explanation explanation, const Observations& observations,
                                         const std::vector<const Effect*>& effects,
                                         const SearchSettings& settings, std::vector<std::string>& said);

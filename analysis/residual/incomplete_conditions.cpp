@@ -3,6 +3,7 @@
 #include "analysis/residual/explanation_parts.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -10,16 +11,29 @@
 namespace tunnelrig {
 namespace {
 
-constexpr double kMostMissing = 0.25;
+bool has_all(const Observations& observations, int row, const std::vector<std::string>& names) {
+  return std::ranges::all_of(
+      names, [&](const std::string& name) { return observations.find(name)->value.row(row).allFinite(); });
+}
 
-/// The conditions that so few runs lack that the others can be looked at alone.
+std::ptrdiff_t complete_rows(const Observations& observations, const std::vector<std::string>& names) {
+  return std::ranges::count_if(observations.all_rows(),
+                               [&](int row) { return has_all(observations, row, names); });
+}
+
+/// Those of the conditions with gaps, fewest first, that leave a third of the runs to be looked at alone.
 std::vector<std::string> nearly_complete(const Observations& observations) {
-  std::vector<std::string> names;
+  std::vector<std::pair<std::ptrdiff_t, std::string>> missing;
   for (const auto& [name, why] : observations.not_usable) {
     const Covariate* covariate = observations.find(name);
     if (covariate == nullptr || covariate->derived || !why.starts_with("missing")) continue;
-    const auto missing = static_cast<double>(covariate->value.array().isNaN().count());
-    if (missing <= kMostMissing * static_cast<double>(covariate->value.size())) names.push_back(name);
+    missing.emplace_back(-complete_rows(observations, {name}), name);
+  }
+  std::ranges::sort(missing);
+  std::vector<std::string> names;
+  for (const auto& [count, name] : missing) {
+    names.push_back(name);
+    if (3 * complete_rows(observations, names) < observations.rows()) names.pop_back();
   }
   return names;
 }
@@ -28,30 +42,45 @@ std::vector<std::string> nearly_complete(const Observations& observations) {
 Observations with_all(const Observations& observations, const std::vector<std::string>& names) {
   std::vector<int> rows;
   for (const int row : observations.all_rows())
-    if (std::ranges::all_of(names, [&](const std::string& name) {
-          return observations.find(name)->value.row(row).allFinite();
-        }))
-      rows.push_back(row);
+    if (has_all(observations, row, names)) rows.push_back(row);
   Observations complete = observations.subset(rows);
   for (const std::string& name : names) complete.not_usable.erase(name);
   return complete;
 }
 
-bool needs_one_of(const AdoptedEffect& adopted, const std::vector<std::string>& names) {
-  return std::ranges::any_of(adopted.term.effect->covariates, [&](const std::string& covariate) {
+bool needs_one_of(const Effect& effect, const std::vector<std::string>& names) {
+  return std::ranges::any_of(effect.covariates, [&](const std::string& covariate) {
     return std::ranges::find(names, covariate) != names.end();
   });
+}
+
+bool is_over_one_of(const UnknownStructure& unknown, const std::vector<std::string>& names) {
+  return std::ranges::any_of(
+      names, [&](const std::string& name) { return name == unknown.covariate || name == unknown.condition; });
 }
 
 /// What was found there that goes with one of them, in words.
 std::vector<std::string> found_with(const Explanation& explanation, const std::vector<std::string>& names) {
   std::vector<std::string> found;
   for (const AdoptedEffect& adopted : explanation.adopted)
-    if (needs_one_of(adopted, names)) found.push_back(adopted.term.label());
+    if (needs_one_of(*adopted.term.effect, names)) found.push_back(adopted.term.label());
   for (const UnknownStructure& unknown : explanation.unknown)
-    if (std::ranges::find(names, unknown.covariate) != names.end())
-      found.push_back("structure over " + unknown.covariate);
+    if (is_over_one_of(unknown, names)) found.push_back("structure over " + unknown.covariate);
   return found;
+}
+
+/// What goes with them there, of which no name can be held against all runs: as structure.
+std::vector<UnknownStructure> structure_over(const std::vector<std::string>& names,
+                                             const Observations& complete, Explanation there,
+                                             std::vector<const Effect*> effects,
+                                             const SearchSettings& settings) {
+  const bool named = std::ranges::any_of(
+      there.adopted, [&](const AdoptedEffect& adopted) { return needs_one_of(*adopted.term.effect, names); });
+  std::erase_if(effects, [&](const Effect* effect) { return needs_one_of(*effect, names); });
+  if (named) there = explain_once(complete, effects, settings);
+  std::erase_if(there.unknown,
+                [&](const UnknownStructure& unknown) { return !is_over_one_of(unknown, names); });
+  return std::move(there.unknown);
 }
 
 }  // namespace
@@ -60,7 +89,7 @@ Explanation without_names_of_incomplete(Explanation explanation, const Observati
                                         const std::vector<const Effect*>& effects,
                                         const SearchSettings& settings, std::vector<std::string>& said) {
   const std::vector<std::string> incomplete = nearly_complete(observations);
-  if (incomplete.empty() || (explanation.adopted.empty() && explanation.unknown.empty())) return explanation;
+  if (incomplete.empty() || explanation.verdict == "insufficient") return explanation;
   const Observations complete = with_all(observations, incomplete);
   if (complete.rows() == 0) return explanation;
   const Explanation there = explain_once(complete, effects, settings);
@@ -83,6 +112,9 @@ Explanation without_names_of_incomplete(Explanation explanation, const Observati
     again.untestable = std::move(explanation.untestable);
     explanation = std::move(again);
   }
+  for (UnknownStructure& unknown : structure_over(incomplete, complete, there, effects, settings))
+    explanation.unknown.push_back(std::move(unknown));
+  explanation.verdict = verdict_of(explanation);
   said.push_back(fmt::format("in the {} of {} {} that have {}, {} is found{}: fill in what is missing",
                              complete.rows(), observations.rows(), observations.from_table ? "rows" : "runs",
                              fmt::join(incomplete, " and "), fmt::join(found, " and "),

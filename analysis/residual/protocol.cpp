@@ -86,14 +86,6 @@ JointFit without_curves(const Attribution& found, const std::vector<int>& rows) 
   return fit;
 }
 
-std::string verdict_of(const Explanation& explanation) {
-  if (explanation.adopted.empty()) return explanation.unknown.empty() ? "no_structure" : "unknown";
-  if (!explanation.unknown.empty()) return "partly_explained";
-  const bool confounded = std::any_of(explanation.adopted.begin(), explanation.adopted.end(),
-                                      [](const AdoptedEffect& a) { return !a.confounded_with.empty(); });
-  return confounded ? "confounded" : "explained";
-}
-
 /// Why nothing can be found out, in words; empty where something can.
 std::string too_few(const Observations& observations, const Seal& seal) {
   if (observations.blocks() < kFewestBlocks)
@@ -325,6 +317,14 @@ void estimate_on_all(const Models& models, const Observations& observations, Exp
 }
 
 }  // namespace
+
+std::string verdict_of(const Explanation& explanation) {
+  if (explanation.adopted.empty()) return explanation.unknown.empty() ? "no_structure" : "unknown";
+  if (!explanation.unknown.empty()) return "partly_explained";
+  const bool confounded = std::any_of(explanation.adopted.begin(), explanation.adopted.end(),
+                                      [](const AdoptedEffect& a) { return !a.confounded_with.empty(); });
+  return confounded ? "confounded" : "explained";
+}
 
 Explanation explain_once(const Observations& observations, const std::vector<const Effect*>& effects,
                          const SearchSettings& settings) {

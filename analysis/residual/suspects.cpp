@@ -49,16 +49,20 @@ double sigma_by_median(const VectorXd& sizes) {
   return upper_median({sizes.begin(), sizes.end()}) / kMedianOfNormal;
 }
 
+/// σ. A campaign has some 1,700 values that are not typed by hand. Of Student's t with three degrees of
+/// freedom one of 2,300 lies beyond 10 of its standard deviations, one of 19,000 beyond 20.
+double gross_beyond(const Observations& observations) { return observations.from_table ? 10 : 20; }
+
 /// Several gross rows hide each other in the variance: of n rows, k alike are hardly beyond √(n/k) of it. But
-/// they lie apart. Residuals of a table's rows, each from its group's median, in σ by the median size of all,
-/// where these are the farthest (at most one of ten): beyond 10, and twice as far as the next; 0 elsewhere,
-/// and for campaigns. The tails of a distribution, or of a group that scatters more, have no such gap.
+/// they lie apart. Residuals of rows (of a campaign's runs, what is common to the rotors), each from its
+/// group's median, in σ by the median size of all, where these are the farthest (at most one of ten): beyond
+/// what is gross, and twice as far as the next; 0 elsewhere. The tails of a distribution, or of a group that
+/// scatters more, have no such gap.
 VectorXd distance_of_those_apart(const Observations& observations, const std::vector<int>& rows,
                                  const VectorXd& residual) {
-  constexpr double kFar = 10, kGap = 2;
+  constexpr double kGap = 2;
   constexpr std::size_t kFewestOfGroup = 5;
   VectorXd away = VectorXd::Zero(residual.size());
-  if (!observations.from_table) return away;
   for (auto& [group, members] : places_of_each(observations.group, rows)) {
     std::erase_if(members, [&](Index r) { return !std::isfinite(residual(r)); });
     if (members.empty()) continue;
@@ -71,7 +75,7 @@ VectorXd distance_of_those_apart(const Observations& observations, const std::ve
   std::vector<double> sorted(size.begin(), size.end());
   std::sort(sorted.begin(), sorted.end(), std::greater<>());
   for (std::size_t k = sorted.size() / kRowsPerGross; sigma > 0 && k > 0; --k)
-    if (sorted[k - 1] > kFar * sigma && sorted[k - 1] >= kGap * sorted[k])
+    if (sorted[k - 1] > gross_beyond(observations) * sigma && sorted[k - 1] >= kGap * sorted[k])
       return (size.array() >= sorted[k - 1]).select(away / sigma, 0);
   return VectorXd::Zero(residual.size());
 }
@@ -94,24 +98,30 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
       }
       left(r, c) = std::max(2 - std::pow(errors.expected_std(r, c) / unit, 2) / sigma2(r, c), kLeastLeft);
     }
-  VectorXd apart = distance_of_those_apart(observations, errors.rows, residual.col(0));
+  VectorXd apart = distance_of_those_apart(observations, errors.rows, residual.rowwise().mean());
   residual.array() /= sigma2.array().sqrt();
   // A gross row under a rare condition may have been taken for scatter that goes with it, and others for
   // none.
-  if (apart.isZero(0)) apart = distance_of_those_apart(observations, errors.rows, residual.col(0));
+  if (apart.isZero(0)) apart = distance_of_those_apart(observations, errors.rows, residual.rowwise().mean());
   const auto missing = residual.array().isNaN();
   const double variance = missing.select(0, residual).squaredNorm() / missing.select(0, left).sum();
   const double limit = student_t_quantile(
       1 - 0.005 / static_cast<double>(std::max<Index>(1, residual.size())), std::max(dof - 1, 1.0));
   std::vector<SuspectRow> result;
   for (Index r = 0; r < residual.rows(); ++r) {
-    double worst = apart(r);
+    // A run in which all rotors are off is left out with all of them, or each would hide the others.
+    std::vector<double> inner;
+    double squares = 0;
     for (Index c = 0; c < residual.cols(); ++c) {
       if (std::isnan(residual(r, c)) || !(variance > 0)) continue;
-      const double inner = residual(r, c) / std::sqrt(variance * left(r, c));
-      const double outer = inner * std::sqrt(std::max(dof - 1, 1.0) / std::max(dof - inner * inner, 1.0));
-      if (std::abs(outer) > std::abs(worst)) worst = outer;
+      inner.push_back(residual(r, c) / std::sqrt(variance * left(r, c)));
+      squares += inner.back() * inner.back();
     }
+    const double own = static_cast<double>(inner.size());
+    const double scale = std::sqrt(std::max(dof - own, 1.0) / std::max(dof - squares, 1.0));
+    double worst = apart(r);
+    for (const double of_rotor : inner)
+      if (std::abs(scale * of_rotor) > std::abs(worst)) worst = scale * of_rotor;
     if (std::abs(worst) > limit)
       result.push_back(
           {.row = observations.name[static_cast<std::size_t>(errors.rows[static_cast<std::size_t>(r)])],
@@ -175,12 +185,9 @@ std::vector<SuspectRow> wild_runs(const Observations& observations) {
 
 std::vector<SuspectRow> gross_rows(const Observations& observations,
                                    const std::vector<SuspectRow>& suspects) {
-  // A campaign has some 1,700 values that are not typed by hand. Of Student's t with three degrees of freedom
-  // one of 2,300 lies beyond 10 of its standard deviations, one of 19,000 beyond 20.
-  const double beyond_heavy_tails = observations.from_table ? 10 : 20;
   std::vector<SuspectRow> result;
   for (const SuspectRow& row : suspects)
-    if (row.apart || std::abs(row.studentised) > beyond_heavy_tails) result.push_back(row);
+    if (row.apart || std::abs(row.studentised) > gross_beyond(observations)) result.push_back(row);
   return result;
 }
 
