@@ -117,7 +117,7 @@ class Examination {
   }
 
   void ledgers() {
-    Names open, lossy, much;
+    Names open, lossy, much, refused, again;
     std::uint64_t lost = 0, emitted = 0;
     for (const auto& [name, run] : data_.raw) {
       const auto ledger = ledger_of(file_, run.id);
@@ -126,6 +126,10 @@ class Examination {
       if (ledger &&
           (!ledger->closed() || ledger->frames_stored != run.frames || ledger->frames_lost != in_gaps))
         open.add(name);
+      if (ledger && ledger->packets_corrupt > 0)
+        refused.add(fmt::format("{} ({})", name, ledger->packets_corrupt));
+      if (ledger && much_came_again(*ledger))
+        again.add(fmt::format("{} ({})", name, ledger->frames_duplicate));
       // Of an imported run the gaps are all that is known.
       const std::uint64_t run_lost = ledger ? ledger->frames_lost : in_gaps;
       const std::uint64_t run_emitted = ledger ? ledger->frames_emitted : run.frames + in_gaps;
@@ -142,6 +146,12 @@ class Examination {
               "check cable, hub and disk; record them again");
     else if (!lossy.empty())
       note("losses", fmt::format("{} of {} frames, in {}", lost, emitted, lossy.text()), "");
+    if (!refused.empty())
+      note("packets", "refused: " + refused.text(),
+           "their checksums are wrong, or their numbers are not believed: check cable and firmware");
+    if (!again.empty())
+      note("packets", "frames under numbers that had passed, dropped: " + again.text(),
+           "the link sends twice, or the board restarts without a new boot id (docs/wire-format.md)");
     if (open.empty() && lossy.empty()) good("loss ledger", "closed for every run, nothing lost");
   }
 

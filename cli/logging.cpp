@@ -45,6 +45,24 @@ std::string free_name(const CampaignFile& file) {
   }
 }
 
+/// Says what arrived and could not be used. True where it is a problem: what came twice is not.
+bool warn_of_unusable(const std::string& run, const Ledger& ledger) {
+  if (ledger.frames_stored == 0 && ledger.bytes_skipped > 0)
+    warn(fmt::format("run {}: {} bytes arrived that are no packets of version 1 (docs/wire-format.md)", run,
+                     ledger.bytes_skipped));
+  if (ledger.packets_corrupt > 0)
+    warn(
+        fmt::format("run {}: {} packets were refused: a wrong checksum, a number that is not believed, or "
+                    "other frames under numbers that had passed",
+                    run, ledger.packets_corrupt));
+  if (much_came_again(ledger))
+    warn(
+        fmt::format("run {}: {} frames came under numbers that had passed and were dropped; a board that "
+                    "restarts needs a new boot id",
+                    run, ledger.frames_duplicate));
+  return ledger.packets_corrupt > 0;
+}
+
 /// What no run sheet could hold would make every run of the file unreadable: it is refused before there is
 /// one.
 const LogOptions& checked(const LogOptions& options) {
@@ -215,9 +233,10 @@ void Logging::show(ProgressBar& bar, const LogProgress& progress) const {
   bar.show(progress.elapsed_s, progress.duration_s,
            fmt::format("{} frames, {} lost, {}{}", progress.ledger->frames_stored,
                        progress.ledger->frames_lost, means_text(volts),
-                       progress.held_up  ? ", ANOTHER PROGRAM HOLDS THE FILE"
-                       : progress.silent ? ", SILENT"
-                                         : ""));
+                       progress.held_up           ? ", ANOTHER PROGRAM HOLDS THE FILE"
+                       : !progress.silent         ? ""
+                       : progress.instead.empty() ? ", SILENT"
+                                                  : fmt::format(", ONLY {}", progress.instead)));
 }
 
 int Logging::report(const std::string& name, const PlannedRun& planned, const LogOutcome& outcome) const {
@@ -249,6 +268,7 @@ int Logging::report(const std::string& name, const PlannedRun& planned, const Lo
                     ledger.packets_corrupt, ledger.reboots, ledger.silences));
     problem = true;
   }
+  problem |= warn_of_unusable(name, ledger);
   if (ledger.frames_test_pattern > 0) {
     warn(fmt::format("run {}: {} frames are the board's test pattern, no measurements", name,
                      ledger.frames_test_pattern));

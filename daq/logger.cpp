@@ -114,10 +114,13 @@ class TrackerSink : public PacketSink {
       : tracker_(tracker), sink_(sink), packet_s_(static_cast<double>(TRW_MAX_FRAMES) / rate_hz) {}
   void packet(const Packet& packet) override {
     const trw_header& header = packet.header;
-    clock_.add(header.boot_id,
-               header.first_ticks + (header.frame_count - std::uint64_t{1}) * header.ticks_per_frame,
-               header.tick_hz, header.ticks_per_frame, time_s_);
+    const std::uint64_t stored = tracker_.ledger().frames_stored;
     tracker_.take(packet, time_s_, sink_);
+    // What brings nothing new may be of another boot. A board may start again without a new id.
+    if (tracker_.ledger().frames_stored > stored)
+      clock_.add(static_cast<std::uint32_t>(tracker_.ledger().reboots),
+                 header.first_ticks + (header.frame_count - std::uint64_t{1}) * header.ticks_per_frame,
+                 header.tick_hz, header.ticks_per_frame, time_s_);
     if (header.tick_hz > 0)
       packet_s_ = static_cast<double>(header.frame_count) * header.ticks_per_frame / header.tick_hz;
   }
@@ -164,6 +167,19 @@ class Watchdog {
   std::uint64_t frames_ = 0;
   double since_s_ = 0, next_alarm_s_ = 0;
 };
+
+/// What arrived between two ledgers that brought no new frame; empty where it is nothing.
+std::string unusable_between(const Ledger& before, const Ledger& now) {
+  if (now.packets_corrupt > before.packets_corrupt)
+    return fmt::format("{} packets with a wrong checksum or a number that is not believed",
+                       now.packets_corrupt - before.packets_corrupt);
+  const std::uint64_t old_frames = now.frames_duplicate + now.frames_late;
+  if (const std::uint64_t known = before.frames_duplicate + before.frames_late; old_frames > known)
+    return fmt::format("{} frames whose numbers have passed", old_frames - known);
+  if (now.bytes_skipped > before.bytes_skipped)
+    return fmt::format("{} bytes that are no packets of version 1", now.bytes_skipped - before.bytes_skipped);
+  return "";
+}
 
 /// The recording thread's side of one run.
 class Recording {
@@ -222,6 +238,8 @@ class Recording {
     const std::string hash = writer_.finish(outcome.state, outcome.ledger);
     oldest_pending_ = Clock::time_point::max();
     outcome.statistics = summarizer.finish(hash);
+    // Of no frames there is no lowest and no highest, which would look stuck.
+    if (outcome.statistics.frames == 0) outcome.statistics.channels.clear();
     return outcome;
   }
 
@@ -233,6 +251,7 @@ class Recording {
     progress({.elapsed_s = static_cast<double>(now.frames_emitted) / rate_hz_,
               .duration_s = settings_.duration_s,
               .silent = watchdog_.silent(),
+              .instead = watchdog_.silent() ? unusable_between(at_last_frame_, now) : "",
               .held_up = Clock::now() - oldest_pending_ > kHeldUp,
               .mean_counts = sink_.means(),
               .ledger = &now,
@@ -252,6 +271,7 @@ class Recording {
       decoder_.finish(packets_);
       return tracker_.complete() ? "" : "the source ended";
     }
+    if (tracker_.ledger().frames_stored != at_last_frame_.frames_stored) at_last_frame_ = ledger();
     switch (watchdog_.look(tracker_.ledger().frames_stored, block.time_s, packets_.packet_s())) {
       case Watchdog::Verdict::kFine:
         break;
@@ -262,9 +282,15 @@ class Recording {
         reader.ask_to_reopen();
         break;
       case Watchdog::Verdict::kGiveUp:
-        return fmt::format("no frame for {:g} s", settings_.give_up_s);
+        return reason_to_give_up();
     }
     return "";
+  }
+
+  std::string reason_to_give_up() const {
+    const std::string instead = unusable_between(at_last_frame_, ledger());
+    return fmt::format("no {}frame for {:g} s{}", instead.empty() ? "" : "new ", settings_.give_up_s,
+                       instead.empty() ? "" : ", only " + instead);
   }
 
   Ledger ledger() const {
@@ -300,6 +326,7 @@ class Recording {
   Watchdog watchdog_;
   const PacketSource& source_;
   std::uint64_t silences_ = 0;
+  Ledger at_last_frame_;
   std::string end_reason_;
   Clock::time_point oldest_pending_ = Clock::time_point::max();
   Clock::time_point next_progress_{};

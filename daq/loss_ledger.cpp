@@ -16,6 +16,11 @@ constexpr double kSameRate = 1e-3;  // what a device that measures its own perio
 /// Late frames are looked up in this many of the newest gaps.
 constexpr std::ptrdiff_t kRememberedGaps = 256;
 
+/// Frames that arrive again are held against so many of the newest, 49 s of the rig: more than any buffer
+/// between it and here holds.
+constexpr std::uint64_t kRememberedFrames = std::uint64_t{1} << 16;
+constexpr std::uint64_t kNoFrame = ~std::uint64_t{0};
+
 const std::uint8_t* frame_at(const Packet& packet, std::size_t index) {
   return reinterpret_cast<const std::uint8_t*>(packet.frames.data()) + index * TRW_FRAME_SIZE;
 }
@@ -55,6 +60,12 @@ bool LossTracker::follow_boot(const trw_header& header, double time_s, FrameSink
   if (std::find(past_boots_.begin(), past_boots_.end(), header.boot_id) != past_boots_.end()) return false;
   past_boots_.push_back(boot_id_);
   boot_id_ = header.boot_id;
+  begin_anew(header, time_s, sink);
+  return true;
+}
+
+/// The board counts from 0 again.
+void LossTracker::begin_anew(const trw_header& header, double time_s, FrameSink& sink) {
   ++ledger_.reboots;
   const double between = std::round((time_s - last_time_s_) * rate_of(header)) - header.frame_count;
   const auto by_clock = static_cast<std::uint64_t>(std::clamp(between, 0.0, 1e15));
@@ -62,7 +73,38 @@ bool LossTracker::follow_boot(const trw_header& header, double time_s, FrameSink
        noted_cause_ != nullptr ? noted_cause_ : "reboot", true, sink);
   next_sequence_ = header.first_sequence;
   lost_ranges_.clear();
-  return true;
+  newest_.clear();
+  contradiction_end_.reset();
+}
+
+/// Whether a packet's numbers have passed and yet it is no copy of what was stored under them.
+bool LossTracker::contradicts(const Packet& packet) const {
+  const std::uint64_t first = packet.header.first_sequence;
+  if (first >= next_sequence_ || newest_.empty()) return false;
+  if (next_sequence_ - first > kRememberedFrames) return true;
+  for (std::size_t i = 0; i < packet.header.frame_count; ++i) {
+    trw_frame frame;
+    trw_get_frame(frame_at(packet, i), &frame);
+    const Remembered& stored = newest_[(first + i) % kRememberedFrames];
+    if (stored.sequence == first + i && !std::ranges::equal(stored.sample, frame.sample)) return true;
+  }
+  return false;
+}
+
+/// Follows a board that restarted with its old boot id, from the second packet on that gives it away: one
+/// alone would move the count for ever. False where the packet must not be used.
+bool LossTracker::follow_restart(const Packet& packet, double time_s, FrameSink& sink) {
+  const std::uint64_t first = packet.header.first_sequence;
+  if (contradiction_end_ == first) {
+    --ledger_.packets_corrupt;  // the one before: its frames are in the gap now
+    begin_anew(packet.header, time_s, sink);
+    return true;
+  }
+  contradiction_end_.reset();
+  if (!contradicts(packet)) return true;
+  contradiction_end_ = first + packet.header.frame_count;
+  ++ledger_.packets_corrupt;
+  return false;
 }
 
 void LossTracker::take(const Packet& packet, double time_s, FrameSink& sink) {
@@ -87,6 +129,7 @@ void LossTracker::take(const Packet& packet, double time_s, FrameSink& sink) {
     ++ledger_.packets_corrupt;
     return;
   }
+  if (!follow_restart(packet, time_s, sink)) return;
   std::size_t known = 0;  // frames of the packet whose numbers have passed already
   if (first < next_sequence_) {
     known = static_cast<std::size_t>(std::min<std::uint64_t>(next_sequence_ - first, header.frame_count));
@@ -112,10 +155,13 @@ void LossTracker::pass(const Packet& packet, std::size_t first, std::size_t coun
   }
   if (count == 0) return;
   samples_.clear();
+  if (newest_.empty()) newest_.resize(kRememberedFrames, {.sequence = kNoFrame, .sample = {}});
   for (std::size_t i = first; i < first + count; ++i) {
     trw_frame frame;
     trw_get_frame(frame_at(packet, i), &frame);
     samples_.insert(samples_.end(), std::begin(frame.sample), std::end(frame.sample));
+    const std::uint64_t sequence = packet.header.first_sequence + i;
+    newest_[sequence % kRememberedFrames] = {.sequence = sequence, .sample = std::to_array(frame.sample)};
     if ((frame.status & TRW_STATUS_OVERRUN) != 0) ++ledger_.frames_overrun;
     if ((frame.status & TRW_STATUS_ADC_ERROR) != 0) ++ledger_.frames_adc_error;
     if ((frame.status & TRW_STATUS_CLIPPED_MASK) != 0) ++ledger_.frames_clipped;

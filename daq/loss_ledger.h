@@ -4,6 +4,7 @@
 #include "daq/packet_decoder.h"
 #include "datasets/raw_store.h"
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -16,7 +17,9 @@ namespace tunnelrig {
 /// counted and dropped.
 ///
 /// A change of the boot id is a reboot: a gap whose length comes from the time between the packets
-/// (`estimated`), because the board's own count starts anew. docs/loss-ledger.md.
+/// (`estimated`), because the board's own count starts anew. So are two packets in a row whose numbers have
+/// passed while their frames are not those that were recorded: a board that draws no new boot id.
+/// docs/loss-ledger.md.
 class LossTracker {
  public:
   /// The run ends when `frames_wanted` frames are accounted for (stored or lost); 0: never.
@@ -42,6 +45,9 @@ class LossTracker {
  private:
   void start(const trw_header& header);
   bool follow_boot(const trw_header& header, double time_s, FrameSink& sink);
+  bool follow_restart(const Packet& packet, double time_s, FrameSink& sink);
+  bool contradicts(const Packet& packet) const;
+  void begin_anew(const trw_header& header, double time_s, FrameSink& sink);
   void lose(std::uint64_t frames, const char* cause, bool estimated, FrameSink& sink);
   void pass(const Packet& packet, std::size_t first, std::size_t count, FrameSink& sink);
   void drop(std::uint64_t first_sequence, std::uint64_t count);
@@ -60,6 +66,13 @@ class LossTracker {
   std::vector<std::pair<std::uint64_t, std::uint64_t>>
       lost_ranges_;                    // [first, end) of this boot that never came, newest last
   std::vector<std::int16_t> samples_;  // of one packet
+
+  struct Remembered {
+    std::uint64_t sequence;
+    std::array<std::int16_t, TRW_CHANNELS> sample;
+  };
+  std::vector<Remembered> newest_;                  // stored frames of this boot, by their number
+  std::optional<std::uint64_t> contradiction_end_;  // where a packet that contradicts them ended, just now
 };
 
 }  // namespace tunnelrig

@@ -41,6 +41,11 @@ struct Ledger {
   bool closed() const { return frames_emitted == frames_stored + frames_lost; }
 };
 
+/// More than a link that now and then sends twice.
+inline bool much_came_again(const Ledger& ledger) {
+  return ledger.frames_duplicate > ledger.frames_emitted / 100;
+}
+
 struct RawRun {
   std::int64_t id = 0;
   std::string run;

@@ -76,6 +76,7 @@ void LiveFeed::progress(const LogProgress& progress) {
   const std::lock_guard lock(mutex_);
   shared_.progress = {.elapsed_s = progress.elapsed_s,
                       .silent = progress.silent,
+                      .instead = progress.instead,
                       .ledger = *progress.ledger,
                       .clock = progress.clock,
                       .ring_frames = progress.ring_frames};

@@ -103,7 +103,10 @@ void LiveFeed::check(const Shared& now, const Scale& scale, Time time) {
                               : fmt::format("its zero moved by {:.4f} V between the last two tares", drift_V),
                 time);
   }
-  alarms_.set("silent", 0, recording && now.progress.silent, "no frames come from the board", time);
+  alarms_.set("silent", 0, recording && now.progress.silent,
+              now.progress.instead.empty() ? "no frames come from the board"
+                                           : fmt::format("no new frames, only {}", now.progress.instead),
+              time);
   alarms_.set("loss", 0, recording && ledger.frames_lost > 0,
               fmt::format("{} of {} frames lost in this run", ledger.frames_lost, ledger.frames_emitted),
               time);

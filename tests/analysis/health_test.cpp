@@ -113,6 +113,21 @@ TEST_F(Health, AnOldCertificateAndAnOpenLedger) {
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("loss ledger: emitted is not stored plus lost in R1"));
 }
 
+TEST_F(Health, OfALedgerWithWhatCouldNotBeUsed) {
+  import();
+  const Database database((folder / "c.db").string(), SQLITE_OPEN_READWRITE);
+  database.execute(
+      "INSERT INTO ledgers (raw_run, frames_emitted, frames_stored, frames_lost, frames_duplicate, "
+      "frames_late, "
+      "packets_corrupt, bytes_skipped, frames_overrun, frames_adc_error, reboots, silences, boot_id, "
+      "first_sequence, end_reason, source) VALUES (1, 400, 400, 0, 50, 0, 3, 0, 0, 0, 0, 0, 1, 0, "
+      "'complete', "
+      "'usb')");
+  EXPECT_THAT(found(Severity::kNote), HasSubstr("packets: refused: R1 (3)"));
+  EXPECT_THAT(found(Severity::kNote),
+              HasSubstr("packets: frames under numbers that had passed, dropped: R1 (50)"));
+}
+
 /// An imported run has no ledger, but its gaps.
 TEST_F(Health, TheGapsOfAnImportAreLosses) {
   campaign.write(folder / "source");

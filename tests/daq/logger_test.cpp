@@ -134,6 +134,42 @@ TEST(Logger, ARunEndsWhereTheRateChanges) {
   EXPECT_EQ(outcome.ledger.frames_stored, 16u);
 }
 
+/// Sixteen frames, then whatever it is given, for ever.
+class StrayBoard : public PacketSource {
+ public:
+  explicit StrayBoard(std::vector<std::byte> stray) : stray_(std::move(stray)) {}
+  ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds) override {
+    const auto bytes = time_s_ == 0 ? test::packet_bytes({.first = 0}) : stray_;
+    time_s_ += 0.5;
+    std::copy(bytes.begin(), bytes.end(), buffer.begin());
+    return {ReadResult::Status::kData, bytes.size(), time_s_};
+  }
+  bool reopen() override { return true; }
+  std::string name() const override { return "stray"; }
+
+ private:
+  std::vector<std::byte> stray_;
+  double time_s_ = 0;
+};
+
+TEST(Logger, SaysWhatArrivesInsteadOfFrames) {
+  for (const auto& [stray, text] :
+       {std::pair(test::packet_bytes({.first = std::uint64_t{1} << 50}), "packets with a wrong checksum"),
+        {test::packet_bytes({.first = 0}), "frames whose numbers have passed"},
+        {std::vector<std::byte>(100, std::byte{7}), "bytes that are no packets of version 1"}}) {
+    const test::TemporaryFolder folder;
+    CampaignFile file = test::new_campaign(folder / "c.db");
+    StrayBoard board(stray);
+    std::string instead;
+    const LogOutcome outcome = log_run(
+        board, file, test::cells("R1"), {.duration_s = 12}, test::summarizer(),
+        [&](const LogProgress& progress) { instead = progress.instead; }, test::never_stop());
+    EXPECT_NE(outcome.ledger.end_reason.find("no new frame for 30 s, only "), std::string::npos);
+    EXPECT_NE(outcome.ledger.end_reason.find(text), std::string::npos) << outcome.ledger.end_reason;
+    EXPECT_NE(instead.find(text), std::string::npos) << instead;
+  }
+}
+
 TEST(Logger, ARunIsNotRecordedTwice) {
   const test::TemporaryFolder folder;
   CampaignFile file = test::new_campaign(folder / "c.db");

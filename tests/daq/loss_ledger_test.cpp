@@ -126,6 +126,52 @@ TEST(LossLedger, ARebootIsAGapNotARestart) {
   EXPECT_EQ(t.list.gaps.size(), 1u);
 }
 
+TEST(LossLedger, ARestartUnderTheOldBootIdIsKnownByItsFrames) {
+  Tracking t;
+  for (std::uint64_t i = 0; i < 50; ++i) t.take({.first = 16 * i}, 0.016 * static_cast<double>(i));
+  for (std::uint64_t i = 0; i < 60; ++i)
+    t.take({.first = 16 * i, .sampled = 1000}, 1.284 + 0.016 * static_cast<double>(i));
+  const Ledger& ledger = t.tracker.ledger();
+  EXPECT_EQ(ledger.reboots, 1u);
+  EXPECT_EQ(ledger.frames_duplicate, 0u);
+  EXPECT_EQ(ledger.packets_corrupt, 0u);
+  ASSERT_EQ(t.list.gaps.size(), 1u);
+  EXPECT_EQ(t.list.gaps[0], (Gap{800, 500, "reboot", true})) << "from 0.784 s to 1.300 s, a packet of it new";
+  EXPECT_EQ(t.list.count(), 800u + 59u * 16u);
+  EXPECT_EQ(t.list.samples[4 * 800], test::sample_of(1016, 0));
+  t.take({.first = 32, .sampled = 1000});
+  EXPECT_EQ(ledger.frames_duplicate, 16u) << "of the new count";
+}
+
+TEST(LossLedger, ARestartBelowAllThatIsRememberedIsKnownToo) {
+  Tracking t;
+  t.take({.first = 1000000});
+  t.take({.first = 0});
+  t.take({.first = 16});
+  EXPECT_EQ(t.tracker.ledger().reboots, 1u);
+  EXPECT_EQ(t.list.gaps.at(0), (Gap{16, 16, "reboot", true}));
+}
+
+TEST(LossLedger, OneContradictingPacketDoesNotMoveTheCount) {
+  Tracking t;
+  for (std::uint64_t i = 0; i < 4; ++i) t.take({.first = 16 * i});
+  t.take({.first = 0, .sampled = 5});
+  t.take({.first = 64});
+  EXPECT_EQ(t.tracker.ledger().packets_corrupt, 1u);
+  EXPECT_EQ(t.tracker.ledger().reboots, 0u);
+  EXPECT_EQ(t.tracker.ledger().frames_lost, 0u);
+  EXPECT_EQ(t.list.count(), 80u);
+}
+
+TEST(LossLedger, WhatALinkSendsAgainInOneGoIsNoRestart) {
+  Tracking t;
+  for (std::uint64_t i = 0; i < 50; ++i) t.take({.first = 16 * i});
+  for (std::uint64_t i = 10; i < 60; ++i) t.take({.first = 16 * i});
+  EXPECT_EQ(t.tracker.ledger().reboots, 0u);
+  EXPECT_EQ(t.tracker.ledger().frames_duplicate, 640u);
+  EXPECT_EQ(t.list.count(), 960u);
+}
+
 TEST(LossLedger, WithoutAClockARebootCountsWhatIsCertain) {
   Tracking t;
   t.take({.first = 5000, .boot = 7});

@@ -18,7 +18,7 @@ std::vector<std::byte> packet_bytes(const PacketSpec& spec) {
                           .frame_count = spec.count};
   std::vector<trw_frame> frames(spec.count);
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    for (std::size_t c = 0; c < 4; ++c) frames[i].sample[c] = sample_of(spec.first + i, c);
+    for (std::size_t c = 0; c < 4; ++c) frames[i].sample[c] = sample_of(spec.sampled + spec.first + i, c);
     frames[i].status = i == 0 ? spec.first_status : std::uint16_t{0};
   }
   std::vector<std::byte> bytes(trw_packet_size(spec.count));

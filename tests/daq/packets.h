@@ -18,6 +18,7 @@ struct PacketSpec {
   std::uint32_t boot = 1;
   std::uint16_t first_status = 0;
   std::uint32_t ticks_per_frame = 84000;  // of 84 MHz
+  std::uint64_t sampled = 0;              // frames that were sampled before a restart: the samples go on
 };
 
 /// The bytes of a packet of recognisable frames, at 1000 frames/s unless said otherwise.

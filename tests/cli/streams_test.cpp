@@ -1,0 +1,70 @@
+// What `log` says of streams that are not as docs/wire-format.md wants them.
+#include "cli/program.h"
+#include "daq/packets.h"
+#include "support/temporary_folder.h"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using test::ProgramResult;
+using testing::HasSubstr;
+using testing::Not;
+
+struct Streams : testing::Test {
+  test::TemporaryFolder folder;
+  std::string bytes;
+
+  void add(const test::PacketSpec& spec) {
+    const auto packet = test::packet_bytes(spec);
+    bytes.append(reinterpret_cast<const char*>(packet.data()), packet.size());
+  }
+  ProgramResult log(const std::string& duration) const {
+    std::ofstream(folder / "bytes", std::ios::binary) << bytes;
+    return test::run_program(
+        folder.path(),
+        "log --db c.db --location OT --session S1 --temperature-C 20 --source replay:bytes "
+        "--duration " +
+            duration);
+  }
+};
+
+TEST_F(Streams, ARestartUnderTheOldBootIdIsAGap) {
+  for (std::uint64_t i = 0; i < 50; ++i) add({.first = 16 * i, .ticks_per_frame = 63000});
+  for (std::uint64_t i = 0; i < 60; ++i) add({.first = 16 * i, .ticks_per_frame = 63000, .sampled = 1000});
+  const ProgramResult result = log("1");
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.out, HasSubstr(": 1317 frames, 16 lost"));
+  EXPECT_THAT(result.error, HasSubstr("0 late, 0 corrupt packets, 1 reboots"));
+}
+
+TEST_F(Streams, ARestartThatRepeatsItselfToTheBitIsNotSilent) {
+  for (const std::uint64_t packets : {50u, 60u})
+    for (std::uint64_t i = 0; i < packets; ++i) add({.first = 16 * i, .ticks_per_frame = 63000});
+  EXPECT_THAT(log("0.65").error, HasSubstr("run R0001: 800 frames came under numbers that had passed"));
+}
+
+TEST_F(Streams, RefusedPacketsAreSaidEvenWhereNothingIsLost) {
+  for (const std::uint64_t first : {std::uint64_t{0}, std::uint64_t{1} << 50, std::uint64_t{16}})
+    add({.first = first, .ticks_per_frame = 63000});
+  const ProgramResult result = log("0.024");
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.out, HasSubstr(": 32 frames, 0 lost"));
+  EXPECT_THAT(result.error, HasSubstr("run R0001: 1 packets were refused"));
+}
+
+TEST_F(Streams, WithoutAPacketNoChannelIsStuck) {
+  bytes = "a board of another make, perhaps";
+  const ProgramResult result = log("1");
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.out, HasSubstr("0 frames, 0 lost, no frames"));
+  EXPECT_THAT(result.error, HasSubstr("run R0001: 32 bytes arrived that are no packets of version 1"));
+  EXPECT_THAT(result.error, Not(HasSubstr("stuck")));
+}
+
+}  // namespace
+}  // namespace tunnelrig
