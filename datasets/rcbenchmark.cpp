@@ -3,6 +3,7 @@
 #include "datasets/error.h"
 
 #include <algorithm>
+#include <map>
 
 namespace tunnelrig {
 namespace {
@@ -49,6 +50,15 @@ void append_sweep(Sheet& all, const Sheet& sweep, const Sheet& sweeps, const std
   }
 }
 
+/// Of one file of the folder.
+struct SweepColumns {
+  std::string file;
+  std::vector<std::string> columns;
+  std::optional<std::string> speed;  // the optical probe's where it read anything, else the electrical one
+};
+
+constexpr const char* kSpeed = "Motor Speed";  // of files of which some have the one and some the other
+
 bool has_nonzero(const Sheet& sheet, const std::string& column) {
   for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
     if (sheet.number(row, column).value_or(0) != 0) return true;
@@ -65,17 +75,65 @@ std::optional<std::string> column_starting(const Sheet& sheet, std::string_view 
   return {};
 }
 
+std::optional<std::string> speed_column(const Sheet& sheet) {
+  const auto optical = column_starting(sheet, "Motor Optical Speed");
+  return optical ? optical : column_starting(sheet, "Motor Electrical Speed");
+}
+
+/// Every file must have the response under the header that the first one has.
+void check_thrust(const std::string& thrust, const std::vector<SweepColumns>& sweeps) {
+  for (const SweepColumns& sweep : sweeps) {
+    if (std::ranges::find(sweep.columns, thrust) != sweep.columns.end()) continue;
+    const auto other = std::ranges::find_if(
+        sweep.columns, [](const std::string& column) { return column.starts_with("Thrust"); });
+    throw InputError::at(sweep.file, 1, "no column {}, which other files of the folder have{}", thrust,
+                         other == sweep.columns.end()
+                             ? ""
+                             : fmt::format("; {} is in another unit or by another name", *other));
+  }
+}
+
+/// The speed's column of all files. Where they differ it is a new one, with what each file's own says.
+std::optional<std::string> common_speed(Sheet& all, const std::vector<SweepColumns>& sweeps,
+                                        const SweepOptions& options) {
+  std::map<std::string, std::string> columns;  // by file
+  const SweepColumns* first = nullptr;
+  const SweepColumns* other = nullptr;
+  for (const SweepColumns& sweep : sweeps) {
+    if (!sweep.speed) continue;
+    columns[sweep.file] = *sweep.speed;
+    if (first == nullptr) first = &sweep;
+    if (*sweep.speed != *first->speed) other = &sweep;
+  }
+  if (first == nullptr) return speed_column(all);
+  if (other == nullptr) return first->speed;
+  if (unit_in_header(*first->speed) != unit_in_header(*other->speed))
+    throw InputError::at(other->file, 1, "its speed is {}, that of {} is {}: import them apart",
+                         *other->speed, first->file, *first->speed);
+  if (options.pole_count)
+    throw InputError::at(other->file, 1, "--pole-count: its speed is {}, that of {} is {}: import them apart",
+                         *other->speed, first->file, *first->speed);
+  const std::string name = fmt::format("{} ({})", kSpeed, unit_in_header(*first->speed));
+  const std::size_t index = all.ensure(name);
+  for (std::size_t row = 0; row < all.rows.size(); ++row) {
+    const auto found = columns.find(all.rows[row].file);
+    if (found != columns.end()) all.rows[row].cells[index] = all.text(row, found->second);
+  }
+  return name;
+}
+
 std::string column_toml(std::string_view section, const std::string& column, std::string_view meaning) {
   return fmt::format("\n{}\ncolumn = \"{}\"\nunit = \"{}\"\n{}", section, column, unit_in_header(column),
                      meaning.empty() ? "" : fmt::format("meaning = \"{}\"\n", meaning));
 }
 
-std::string sweep_schema(const Sheet& all, const SweepOptions& options, const std::string& source) {
+std::string sweep_schema(Sheet& all, const std::vector<SweepColumns>& sweeps, const SweepOptions& options,
+                         const std::string& source) {
   const auto thrust = column_starting(all, "Thrust");
   if (!thrust)
     throw InputError::in(source, "no column Thrust (unit) with a value; is this an RCbenchmark sweep?");
-  auto speed = column_starting(all, "Motor Optical Speed");
-  if (!speed) speed = column_starting(all, "Motor Electrical Speed");
+  check_thrust(*thrust, sweeps);
+  const auto speed = common_speed(all, sweeps, options);
   const std::string group = all.find("group") ? "group" : "file";
   std::string toml = fmt::format("format = \"{}\"\nname = \"{}\"\ngroups = [\"{}\"]\nblocks = \"file\"\n",
                                  kTableFormat, std::filesystem::path(source).filename().string(), group);
@@ -112,10 +170,15 @@ ObservationTable read_rcbenchmark(const std::filesystem::path& source, const Swe
     sweeps.require("file");
   }
   Sheet all{.file = source.string(), .columns = {"file"}, .rows = {}};
-  for (const auto& path : sweep_files(source))
-    append_sweep(all, read_csv(path, kMessage), sweeps, path.filename().string());
+  std::vector<SweepColumns> read;
+  for (const auto& path : sweep_files(source)) {
+    const Sheet sweep = read_csv(path, kMessage);
+    const std::string file = path.filename().string();
+    append_sweep(all, sweep, sweeps, file);
+    if (options.schema.empty()) read.push_back({file, sweep.columns, speed_column(sweep)});
+  }
   const std::string toml =
-      options.schema.empty() ? sweep_schema(all, options, source.string()) : read_text(options.schema);
+      options.schema.empty() ? sweep_schema(all, read, options, source.string()) : read_text(options.schema);
   const std::string name = options.schema.empty() ? "the headers' schema" : options.schema.string();
   return read_observations(all, parse_table_schema(toml, name));
 }

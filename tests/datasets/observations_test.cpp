@@ -119,6 +119,40 @@ TEST(Rcbenchmark, TakesSpeedFromTheProbeThatWasThere) {
   EXPECT_NEAR(table.rows[1].response, 0.04 * 9.80665, 1e-12);
 }
 
+TEST(Rcbenchmark, EachFileHasTheSpeedOfItsOwnProbe) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "in");
+  const std::string header = "Thrust (gf),Motor Electrical Speed (RPM),Motor Optical Speed (RPM)\n";
+  write_text(folder / "in/a.csv", header + "10,0,3000\n40,0,6000\n");
+  write_text(folder / "in/b.csv", header + "10,3100,0\n40,6100,0\n");
+  write_text(folder / "in/c.csv", "Thrust (gf)\n10\n");
+  const auto table = read_rcbenchmark(folder / "in", {});
+  ASSERT_EQ(table.rows.size(), 5u);
+  EXPECT_EQ(table.schema.speed_column, "Motor Speed (RPM)");
+  EXPECT_EQ(table.rows[1].speed_rpm, 6000);
+  EXPECT_EQ(table.rows[3].speed_rpm, 6100);
+  EXPECT_FALSE(table.rows[4].speed_rpm);
+  EXPECT_THAT(
+      message_of([&] { read_rcbenchmark(folder / "in", {.pole_count = 14}); }),
+      HasSubstr("b.csv:1: --pole-count: its speed is Motor Electrical Speed (RPM), that of a.csv is"));
+  write_text(folder / "in/b.csv", "Thrust (gf),Motor Electrical Speed (rad/s)\n10,310\n");
+  EXPECT_THAT(message_of([&] { read_rcbenchmark(folder / "in", {}); }),
+              HasSubstr("b.csv:1: its speed is Motor Electrical Speed (rad/s), that of a.csv is"));
+}
+
+TEST(Rcbenchmark, AFileWithoutTheThrustOfTheOthersIsNamed) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "in");
+  write_text(folder / "in/a.csv", "Thrust (gf),Motor Optical Speed (RPM)\n10,3000\n");
+  write_text(folder / "in/c.csv", "Thrust (lbf),Motor Optical Speed (RPM)\n10,3000\n");
+  EXPECT_THAT(message_of([&] { read_rcbenchmark(folder / "in", {}); }),
+              testing::StrEq("c.csv:1: no column Thrust (gf), which other files of the folder have; Thrust "
+                             "(lbf) is in another unit or by another name"));
+  write_text(folder / "in/c.csv", "Motor Optical Speed (RPM)\n3000\n");
+  EXPECT_THAT(message_of([&] { read_rcbenchmark(folder / "in", {}); }),
+              testing::StrEq("c.csv:1: no column Thrust (gf), which other files of the folder have"));
+}
+
 TEST(Rcbenchmark, MessagesMayHoldCommas) {
   const test::TemporaryFolder folder;
   write_text(folder / "s.csv",
