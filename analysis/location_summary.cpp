@@ -314,6 +314,23 @@ LocationValue combine(const LocationMeans& means, std::size_t l, double noise_va
   return value;
 }
 
+/// Each source's covariance over the root of its degrees of freedom. The locations' own scatter has those of
+/// each location.
+std::vector<Eigen::MatrixXd> over_root_dof(const LocationMeans& means,
+                                           const std::vector<SharedSource>& sources,
+                                           Eigen::MatrixXd SharedSource::*slopes) {
+  Eigen::VectorXd scale(means.covariance.rows());
+  for (Eigen::Index l = 0; l < scale.size(); ++l)
+    scale(l) = std::pow(means.dof[static_cast<std::size_t>(l)], -0.25);  // 0 where they are infinite
+  std::vector<Eigen::MatrixXd> scaled{scale.asDiagonal() * means.covariance * scale.asDiagonal()};
+  for (const SharedSource& source : sources) {
+    if (!std::isfinite(source.dof) || source.dof <= 0) continue;
+    scaled.emplace_back(source.*slopes * source.covariance * (source.*slopes).transpose() /
+                        std::sqrt(source.dof));
+  }
+  return scaled;
+}
+
 Budget budget_of(const LocationMeans& means, const VarianceComponents& components, std::size_t l,
                  double noise_variance, const std::vector<SharedSource>& sources) {
   Budget budget;
@@ -380,6 +397,8 @@ Summary summarize_locations(const CampaignData& data, const Reduction& reduction
   }
   summary.c_t_covariance = with_noise(c_t_scatter.means.covariance, noise_c_t);
   summary.u_covariance = has_u ? with_noise(u_scatter.means.covariance, noise_u) : Eigen::MatrixXd(0, 0);
+  summary.c_t_over_root_dof = over_root_dof(c_t_scatter.means, sources, &SharedSource::c_t);
+  if (has_u) summary.u_over_root_dof = over_root_dof(u_scatter.means, sources, &SharedSource::u);
   for (const SharedSource& source : sources) {
     summary.c_t_covariance += source.c_t * source.covariance * source.c_t.transpose();
     if (has_u) summary.u_covariance += source.u * source.covariance * source.u.transpose();

@@ -49,6 +49,9 @@ struct Summary {
   std::vector<LocationSummary> locations;  // tunnel first, column by column
   Eigen::MatrixXd c_t_covariance;          // between locations, all sources
   Eigen::MatrixXd u_covariance;
+  /// For Welch and Satterthwaite: the covariance of each source of finite degrees of freedom ν, over √ν. A
+  /// sum over locations with weights w and variance u² has ν = u⁴ / Σ (wᵀ S w)².
+  std::vector<Eigen::MatrixXd> c_t_over_root_dof, u_over_root_dof;
   std::vector<std::string> notes;  // what was left out of the budget, and why
 };
 

@@ -161,6 +161,10 @@ MapInput map_input(const CampaignData& data, const Summary& summary, const std::
   }
   input.c_t_covariance = summary.c_t_covariance(rows, rows);
   input.u_covariance = summary.u_covariance(rows, rows);
+  for (const Eigen::MatrixXd& part : summary.c_t_over_root_dof)
+    input.c_t_over_root_dof.emplace_back(part(rows, rows));
+  for (const Eigen::MatrixXd& part : summary.u_over_root_dof)
+    input.u_over_root_dof.emplace_back(part(rows, rows));
   return input;
 }
 

@@ -23,6 +23,12 @@ VectorXd values_of(const std::vector<LocationEstimate>& locations, double Locati
   return values;
 }
 
+std::vector<MatrixXd> transformed(const std::vector<MatrixXd>& covariances, const MatrixXd& by) {
+  std::vector<MatrixXd> result;
+  for (const MatrixXd& covariance : covariances) result.emplace_back(by * covariance * by.transpose());
+  return result;
+}
+
 std::size_t index_of_origin(const std::vector<LocationEstimate>& locations) {
   const auto at_origin = [](const auto& location) {
     return same_position(position(location), TunnelPoint{});
@@ -74,7 +80,9 @@ Estimates merge_coincident(const Estimates& estimates, const Coincidence& positi
   if ((c * merged).cwiseAbs().maxCoeff() > 1e-6 * x.cwiseAbs().maxCoeff()) throw InputError(what);
   const MatrixXd covariance = sigma - gain * c * sigma;
   const MatrixXd kept = covariance(positions.kept, positions.kept);
-  return {merged(positions.kept), 0.5 * (kept + kept.transpose())};
+  const MatrixXd shares = (MatrixXd::Identity(x.size(), x.size()) - gain * c)(positions.kept, Eigen::all);
+  return {merged(positions.kept), 0.5 * (kept + kept.transpose()),
+          transformed(estimates.over_root_dof, shares)};
 }
 
 }  // namespace tunnelrig

@@ -15,10 +15,15 @@ namespace tunnelrig {
 struct Estimates {
   Eigen::VectorXd values;
   Eigen::MatrixXd covariance;
+  std::vector<Eigen::MatrixXd> over_root_dof;  // of each source (Summary), n × n
 };
 
 /// One member of every location.
 Eigen::VectorXd values_of(const std::vector<LocationEstimate>& locations, double LocationEstimate::*value);
+
+/// A Σ Aᵀ of each.
+std::vector<Eigen::MatrixXd> transformed(const std::vector<Eigen::MatrixXd>& covariances,
+                                         const Eigen::MatrixXd& by);
 
 /// The index of the location at (0, 0); the number of locations where there is none.
 std::size_t index_of_origin(const std::vector<LocationEstimate>& locations);

@@ -62,7 +62,7 @@ struct DisturbanceMap {
   MapLayer uneven_thrust;  // U (5.1): right pair minus left pair, so that a negative U rolls to the right
   std::vector<MeasuredLocation> locations;
   std::string method;          // "gaussian-process" or "thin-plate-spline"
-  double coverage_factor = 0;  // u95 over the standard uncertainty
+  double coverage_factor = 0;  // u95 over the standard deviation of the normal error of that 95 % interval
   double c_t_origin = 0;       // C_T0, at OT
   std::optional<double> c_t_open_space;
   FitSummary delta_ct_fit, uneven_thrust_fit;

@@ -1,9 +1,11 @@
 #include "analysis/maps/field_data.h"
 
 #include "analysis/maps/coincident.h"
+#include "analysis/maps/field_estimate.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -28,9 +30,9 @@ ThrustChange thrust_change(const MapInput& merged) {
   MatrixXd jacobian = MatrixXd::Identity(c_t.size(), c_t.size());
   jacobian.col(origin) -= ratio;
   const double scale = 100 / c_t(origin);
-  return {
-      {(ratio.array() - 1) * 100, scale * scale * jacobian * merged.c_t_covariance * jacobian.transpose()},
-      jacobian * jacobian.transpose()};
+  return {{(ratio.array() - 1) * 100, scale * scale * jacobian * merged.c_t_covariance * jacobian.transpose(),
+           transformed(merged.c_t_over_root_dof, scale * jacobian)},
+          jacobian * jacobian.transpose()};
 }
 
 FieldData folded(const MapInput& merged, Parity parity, Estimates estimates, const MatrixXd& excess) {
@@ -43,12 +45,14 @@ FieldData folded(const MapInput& merged, Parity parity, Estimates estimates, con
   }
   estimates.values = sign.asDiagonal() * estimates.values;
   estimates.covariance = sign.asDiagonal() * estimates.covariance * sign.asDiagonal();
+  estimates.over_root_dof = transformed(estimates.over_root_dof, sign.asDiagonal());
   const Coincidence positions = coincidence(data.points);
   estimates = merge_coincident(
       estimates, positions,
       fmt::format("{}: mirror images differ, and their covariance says that they cannot", merged.source));
   data.values = estimates.values;
   data.covariance = estimates.covariance;
+  data.over_root_dof = estimates.over_root_dof;
   data.excess = excess(positions.kept, positions.kept);
   data.points.clear();
   for (const Index i : positions.kept) {
@@ -72,7 +76,8 @@ FieldData thrust_change_data(const MapInput& merged) {
 FieldData uneven_thrust_data(const MapInput& merged) {
   const auto n = static_cast<Index>(merged.locations.size());
   return folded(merged, Parity::kOdd,
-                {values_of(merged.locations, &LocationEstimate::u_percent), merged.u_covariance},
+                {values_of(merged.locations, &LocationEstimate::u_percent), merged.u_covariance,
+                 merged.u_over_root_dof},
                 MatrixXd::Identity(n, n));
 }
 
@@ -88,6 +93,7 @@ FieldData without(const FieldData& data, Index left_out) {
   rest.values = data.values(kept);
   rest.covariance = data.covariance(kept, kept);
   rest.excess = data.excess(kept, kept);
+  for (const MatrixXd& source : data.over_root_dof) rest.over_root_dof.emplace_back(source(kept, kept));
   return rest;
 }
 
@@ -95,10 +101,19 @@ double thrust_coefficient_at_origin(const MapInput& merged) {
   return merged.locations[index_of_origin(merged.locations)].c_t;
 }
 
-std::vector<MeasuredLocation> measured_locations(const MapInput& merged, double coverage_factor) {
+double effective_dof(const std::vector<MatrixXd>& over_root_dof, const VectorXd& weights, double variance) {
+  double over_dof = 0;
+  for (const MatrixXd& source : over_root_dof) over_dof += std::pow(weights.dot(source * weights), 2);
+  return over_dof > 0 ? std::max(1.0, variance * variance / over_dof)
+                      : std::numeric_limits<double>::infinity();
+}
+
+std::vector<MeasuredLocation> measured_locations(const MapInput& merged) {
   const Estimates change = thrust_change(merged).estimates;
-  const auto u95 = [&](const MatrixXd& covariance, Index i) {
-    return coverage_factor * std::sqrt(std::max(0.0, covariance(i, i)));
+  const auto u95 = [&](const MatrixXd& covariance, const std::vector<MatrixXd>& over_root_dof, Index i) {
+    const double variance = std::max(0.0, covariance(i, i));
+    return expanded(std::sqrt(variance),
+                    effective_dof(over_root_dof, VectorXd::Unit(covariance.rows(), i), variance));
   };
   std::vector<MeasuredLocation> locations;
   for (const LocationEstimate& location : merged.locations) {
@@ -107,9 +122,9 @@ std::vector<MeasuredLocation> measured_locations(const MapInput& merged, double 
                          .y_norm = location.y_norm,
                          .z_norm = location.z_norm,
                          .delta_ct_percent = change.values(i),
-                         .delta_ct_u95_percent = u95(change.covariance, i),
+                         .delta_ct_u95_percent = u95(change.covariance, change.over_root_dof, i),
                          .uneven_thrust_percent = location.u_percent,
-                         .uneven_thrust_u95_percent = u95(merged.u_covariance, i)});
+                         .uneven_thrust_u95_percent = u95(merged.u_covariance, merged.u_over_root_dof, i)});
   }
   return locations;
 }

@@ -27,6 +27,7 @@ struct FieldData {
   /// What would be added to `covariance` if each location had one more error of variance 1, independent of
   /// the others. Not the identity for ΔC_T: OT's share of it reaches every other location.
   Eigen::MatrixXd excess;
+  std::vector<Eigen::MatrixXd> over_root_dof;  // of each source of the measured covariance (Summary)
 
   Eigen::Index size() const { return values.size(); }
 };
@@ -45,8 +46,12 @@ FieldData without(const FieldData& data, Eigen::Index left_out);
 /// C_T0.
 double thrust_coefficient_at_origin(const MapInput& merged);
 
-/// The locations as measured, on the side of the tunnel where they were; u95 is coverage_factor times the
-/// standard uncertainty.
-std::vector<MeasuredLocation> measured_locations(const MapInput& merged, double coverage_factor);
+/// Degrees of freedom of Σ w_i measured_i plus what is known exactly, together of that variance (Welch and
+/// Satterthwaite): infinite where no source has any, and never below 1.
+double effective_dof(const std::vector<Eigen::MatrixXd>& over_root_dof, const Eigen::VectorXd& weights,
+                     double variance);
+
+/// The locations as measured, on the side of the tunnel where they were; u95 by Student's t.
+std::vector<MeasuredLocation> measured_locations(const MapInput& merged);
 
 }  // namespace tunnelrig

@@ -9,6 +9,7 @@
 #include "analysis/maps/disturbance_map.h"
 #include "datasets/locations.h"
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,13 @@ namespace tunnelrig {
 struct FieldEstimate {
   double value = 0;
   double standard_uncertainty = 0;
+  double dof = std::numeric_limits<double>::infinity();  // of it, Welch–Satterthwaite
+
+  double u95() const;  // half width of the 95 % interval
 };
+
+/// Half width of the 95 % interval: Student's t times the standard uncertainty.
+double expanded(double standard_uncertainty, double dof);
 
 /// One location, predicted by the field fitted with the same hyperparameters to all others; per cent.
 struct LeftOut {

@@ -66,7 +66,9 @@ FieldEstimate GaussianProcess::at(const TunnelPoint& point) const {
   const VectorXd with_data = covariance_with_data(point);
   const double unexplained = covariance(point, point) - factor_.matrixL().solve(with_data).squaredNorm();
   const double excess = std::pow(hyperparameters_.excess_percent, 2) * excess_share(data_.parity, point);
-  return {with_data.dot(weights_), std::sqrt(std::max(0.0, unexplained) + excess)};
+  const double variance = std::max(0.0, unexplained) + excess;
+  const double dof = effective_dof(data_.over_root_dof, factor_.solve(with_data), variance);
+  return {with_data.dot(weights_), std::sqrt(variance), dof};
 }
 
 std::vector<LeftOut> GaussianProcess::leave_one_out() const {

@@ -123,20 +123,24 @@ MapInput merge_locations(const MapInput& input) {
   check_spread(input);
   check_covariance(input, input.c_t_covariance, "C_T");
   check_covariance(input, input.u_covariance, "U");
+  for (const MatrixXd& source : input.c_t_over_root_dof) check_covariance(input, source, "C_T by source");
+  for (const MatrixXd& source : input.u_over_root_dof) check_covariance(input, source, "U by source");
 
   std::vector<TunnelPoint> points;
   std::transform(input.locations.begin(), input.locations.end(), std::back_inserter(points), position);
   const Coincidence positions = coincidence(points);
   const std::string differ = "at one position differ, and their covariance says that they cannot";
-  const Estimates c_t =
-      merge_coincident({values_of(input.locations, &LocationEstimate::c_t), input.c_t_covariance}, positions,
-                       fmt::format("{}: estimates of C_T {}", input.source, differ));
-  const Estimates u =
-      merge_coincident({values_of(input.locations, &LocationEstimate::u_percent), input.u_covariance},
-                       positions, fmt::format("{}: estimates of U {}", input.source, differ));
+  const Estimates c_t = merge_coincident(
+      {values_of(input.locations, &LocationEstimate::c_t), input.c_t_covariance, input.c_t_over_root_dof},
+      positions, fmt::format("{}: estimates of C_T {}", input.source, differ));
+  const Estimates u = merge_coincident(
+      {values_of(input.locations, &LocationEstimate::u_percent), input.u_covariance, input.u_over_root_dof},
+      positions, fmt::format("{}: estimates of U {}", input.source, differ));
   MapInput merged{.source = input.source,
                   .c_t_covariance = c_t.covariance,
                   .u_covariance = u.covariance,
+                  .c_t_over_root_dof = c_t.over_root_dof,
+                  .u_over_root_dof = u.over_root_dof,
                   .geometry = input.geometry,
                   .c_t_open_space = input.c_t_open_space};
   for (const Index i : positions.kept) {

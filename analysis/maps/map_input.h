@@ -26,6 +26,8 @@ struct MapInput {
   std::vector<LocationEstimate> locations;
   Eigen::MatrixXd c_t_covariance;  // n × n
   Eigen::MatrixXd u_covariance;    // n × n, square percentage points
+  /// Summary's of the same name, each n × n; none where the covariances are known exactly.
+  std::vector<Eigen::MatrixXd> c_t_over_root_dof, u_over_root_dof;
   MapGeometry geometry;
   std::optional<double> c_t_open_space;
 };

@@ -57,7 +57,9 @@ VectorXd ThinPlateSpline::basis(const TunnelPoint& point) const {
 FieldEstimate ThinPlateSpline::at(const TunnelPoint& point) const {
   require_inside(point);
   const VectorXd weights = (inverse_ * basis(point)).head(data_.size());  // of the measured values
-  return {weights.dot(data_.values), std::sqrt(std::max(0.0, weights.dot(data_.covariance * weights)))};
+  const double variance = std::max(0.0, weights.dot(data_.covariance * weights));
+  return {weights.dot(data_.values), std::sqrt(variance),
+          effective_dof(data_.over_root_dof, weights, variance)};
 }
 
 std::vector<LeftOut> ThinPlateSpline::leave_one_out() const {

@@ -24,6 +24,8 @@ FitSummary summary_of(const FittedField& field) {
   return summary;
 }
 
+constexpr double kNormalCoverage = 1.96;  // flight draws normal errors: u95 over this, whatever the dof
+
 /// To 10⁻⁶, far below what is known; a −0 becomes 0.
 double rounded(double percent) { return std::round(percent * 1e6) / 1e6 + 0.0; }
 
@@ -65,28 +67,27 @@ MapGrid regular_grid(int nodes) {
   return {axis, axis};
 }
 
-MapLayer sample(const FittedField& field, const MapGrid& grid, double coverage_factor) {
+MapLayer sample(const FittedField& field, const MapGrid& grid) {
   MapLayer layer;
   for (const double z_norm : grid.z_norm) {
     for (const double y_norm : grid.y_norm) {
       const FieldEstimate estimate = estimate_at(field, {y_norm, z_norm});
       layer.value_percent.push_back(rounded(estimate.value));
-      layer.u95_percent.push_back(rounded(coverage_factor * estimate.standard_uncertainty));
+      layer.u95_percent.push_back(rounded(estimate.u95()));
     }
   }
   return layer;
 }
 
 DisturbanceMap disturbance_map(const TunnelMaps& maps, int nodes, const std::string& provenance) {
-  const double k = maps.settings.coverage_factor;
   const MapGrid grid = regular_grid(nodes);
   return {.geometry = maps.input.geometry,
           .grid = grid,
-          .delta_ct = sample(maps.delta_ct, grid, k),
-          .uneven_thrust = sample(maps.uneven_thrust, grid, k),
-          .locations = measured_locations(maps.input, k),
+          .delta_ct = sample(maps.delta_ct, grid),
+          .uneven_thrust = sample(maps.uneven_thrust, grid),
+          .locations = measured_locations(maps.input),
           .method = name_of(maps.settings.method),
-          .coverage_factor = k,
+          .coverage_factor = kNormalCoverage,
           .c_t_origin = thrust_coefficient_at_origin(maps.input),
           .c_t_open_space = maps.input.c_t_open_space,
           .delta_ct_fit = summary_of(maps.delta_ct),

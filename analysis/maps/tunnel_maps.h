@@ -23,8 +23,7 @@ MapMethod map_method(const std::string& name);
 
 struct MapSettings {
   MapMethod method = MapMethod::kGaussianProcess;
-  double coverage_factor = 1.96;  // U95 over the standard uncertainty
-  HyperparameterPriors priors;    // of the Gaussian process
+  HyperparameterPriors priors;  // of the Gaussian process
 };
 
 using FittedField = std::variant<GaussianProcess, ThinPlateSpline>;
@@ -50,7 +49,7 @@ std::vector<LeftOut> leave_one_out(const FittedField& field);
 MapGrid regular_grid(int nodes);
 
 /// The field on a grid, rounded to 10⁻⁶ percentage points; never −0.
-MapLayer sample(const FittedField& field, const MapGrid& grid, double coverage_factor);
+MapLayer sample(const FittedField& field, const MapGrid& grid);
 
 /// What disturbance_map.json holds. `provenance` is the text of a JSON object.
 DisturbanceMap disturbance_map(const TunnelMaps& maps, int nodes, const std::string& provenance);

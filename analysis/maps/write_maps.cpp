@@ -89,8 +89,8 @@ WrittenMaps write_maps(const std::filesystem::path& folder, const TunnelMaps& ma
   Drawing delta_ct{"delta_ct", "ΔC_T", "Change of thrust coefficient against O_T", "ΔC_T (%)"};
   Drawing uneven{"uneven_thrust", "U", "Uneven thrust, right pair minus left pair",
                  "U (%), negative rolls to the right"};
-  delta_ct.layer = sample(maps.delta_ct, grid, map.coverage_factor);
-  uneven.layer = sample(maps.uneven_thrust, grid, map.coverage_factor);
+  delta_ct.layer = sample(maps.delta_ct, grid);
+  uneven.layer = sample(maps.uneven_thrust, grid);
   for (Drawing* drawing : {&delta_ct, &uneven}) {
     drawing->lines = contour_plot(grid, drawing->layer.value_percent, kMostLevels);
   }

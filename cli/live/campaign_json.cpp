@@ -160,9 +160,8 @@ std::string maps_json(const CampaignData& data, const Reduction& reduction) {
   const Summary summary = summarize_locations(data, reduction);
   const TunnelMaps maps = fit_maps(map_input(data, summary, "campaign"));
   const MapGrid grid = regular_grid(kMapNodes);
-  const double k = maps.settings.coverage_factor;
-  const Json json{{"delta_ct", layer_json(grid, sample(maps.delta_ct, grid, k))},
-                  {"uneven_thrust", layer_json(grid, sample(maps.uneven_thrust, grid, k))}};
+  const Json json{{"delta_ct", layer_json(grid, sample(maps.delta_ct, grid))},
+                  {"uneven_thrust", layer_json(grid, sample(maps.uneven_thrust, grid))}};
   return json.dump();
 }
 

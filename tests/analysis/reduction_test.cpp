@@ -1,6 +1,7 @@
 #include "analysis/air.h"
 #include "analysis/conventions.h"
 #include "analysis/location_summary.h"
+#include "analysis/maps/field_data.h"
 #include "analysis/reduction_output.h"
 #include "datasets/csv.h"
 #include "support/message_of.h"
@@ -240,6 +241,32 @@ TEST(ReductionOutput, RotorsAverageToC_TOfOneRotorAndTextsKeepToTheirCells) {
   }
   EXPECT_EQ(parse_csv(runs_csv(data, reduction, Convention::kThesis), "runs.csv").text(1, "location"),
             "on the \"left\", low");
+}
+
+/// Four places, each twice in two sessions, in all sorts of scatter.
+CampaignData small_campaign() {
+  std::string rows;
+  int run = 0;
+  for (int session = 1; session <= 2; ++session)
+    for (const char* place : {"OT", "H2V0", "H4V2", "H4V-2"})
+      for (int repeat = 1; repeat <= 2; ++repeat, ++run) {
+        const double wave = 0.02 * std::sin(3.0 * run);
+        rows += fmt::format("R{},{},{},S{},2026-03-0{}T08:{:02}Z,,{},{},{},{},20,,,\n", run, place, repeat,
+                            session, session, run, 7.1 + wave, 7.4 - wave, 7.2 + 0.01 * session, 7.3);
+      }
+  return given_thrusts(rows);
+}
+
+TEST(Locations, TheMapsU95OfUIsTheirs) {
+  const CampaignData data = small_campaign();
+  const Summary summary = summarize_locations(data, reduce_runs(data, {}));
+  const auto measured = measured_locations(merge_locations(map_input(data, summary, "c.db")));
+  ASSERT_EQ(measured.size(), 4u);
+  for (std::size_t l = 0; l < measured.size(); ++l) {
+    const LocationValue& u = summary.locations[l].u_percent;
+    ASSERT_LT(u.dof, 20);
+    EXPECT_NEAR(measured[l].uneven_thrust_u95_percent, u.u95, 1e-9) << measured[l].label;
+  }
 }
 
 }  // namespace

@@ -58,8 +58,7 @@ void add_layer(const Material& material, const FittedField& field, const FitSumm
                const MapTexts& texts, double width_mm, Figures& figures) {
   const TunnelMaps& maps = *material.fitted;
   const MapGrid grid = regular_grid(kPrintedNodes);
-  const double k = maps.settings.coverage_factor;
-  const MapLayer layer = sample(field, grid, k);
+  const MapLayer layer = sample(field, grid);
   Picture picture{.colour_label = fmt::format("{} [%]", texts.symbol),
                   .diverging = true,
                   .grid = grid,
@@ -86,7 +85,7 @@ void add_layer(const Material& material, const FittedField& field, const FitSumm
   picture.lines = contour_plot(grid, picture.values, kPrintedUncertaintyLevels);
   figures.drawn.push_back(drawn_map(
       picture, fmt::format("{}_u95", texts.name),
-      fmt::format("U95 of the figure {} ({:g} standard uncertainties)", texts.name, k) + shared, width_mm));
+      fmt::format("U95 of the figure {} (half width of the 95 % interval)", texts.name) + shared, width_mm));
 }
 
 }  // namespace

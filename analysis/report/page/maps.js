@@ -187,7 +187,7 @@ function mapFigure(maps, field) {
   const caption = sentences(
       tells, `Crosses: the ${maps.locations.length} measured locations.`,
       mirrored && 'Dashed lines: the mirror image of the measured half.',
-      'U95, 1.96 standard uncertainties, comes from the covariance of the locations (repeats, sessions,',
+      'U95, the half width of the 95 % interval, comes from the covariance of the locations (repeats, sessions,',
       `and what they share) and from the field in between (${maps.method.replaceAll('-', ' ')}).`,
       fitOf(maps[field]));
   return figure(title, layers, place, caption, command('map', '--out maps'));

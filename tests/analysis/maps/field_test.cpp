@@ -1,6 +1,7 @@
 // The same assertions over both methods and both fields.
 #include "analysis/maps/symmetric_kernel.h"
 #include "analysis/maps/tunnel_maps.h"
+#include "calibration/distributions.h"
 #include "published_input.h"
 
 #include <algorithm>
@@ -52,6 +53,29 @@ TEST_P(Field, IsExactlyZeroWhereItIsKnownToBe) {
     EXPECT_EQ(estimate_at(maps.uneven_thrust, {0, z_norm}).value, 0) << z_norm;
     EXPECT_EQ(estimate_at(maps.uneven_thrust, {0, z_norm}).standard_uncertainty, 0) << z_norm;
   }
+}
+
+TEST_P(Field, IsExpandedByTheDegreesOfFreedomOfWhatItLeansOn) {
+  MapInput input = published_input(3, {.independent_percent = 0.1, .shared_u_percent = 0.2});
+  const TunnelMaps known = fit(input);
+  const auto n = static_cast<Index>(input.locations.size());
+  const double root = std::sqrt(2.0);  // of 2 degrees of freedom
+  input.u_over_root_dof = {MatrixXd::Constant(n, n, 0.04 / root), MatrixXd::Identity(n, n) * 0.01 / root};
+  const TunnelMaps maps = fit(input);
+  const TunnelPoint place{input.locations[20].y_norm, input.locations[20].z_norm};
+  const FieldEstimate before = estimate_at(known.uneven_thrust, place),
+                      there = estimate_at(maps.uneven_thrust, place);
+  EXPECT_EQ(there.value, before.value);
+  EXPECT_EQ(there.standard_uncertainty, before.standard_uncertainty);
+  EXPECT_NEAR(before.u95(), 1.96 * before.standard_uncertainty, 1e-4);
+  EXPECT_GT(there.u95(), 1.01 * before.u95());
+  EXPECT_NEAR(there.u95(), student_t_quantile(0.975, there.dof) * there.standard_uncertainty, 1e-12);
+  if (GetParam() == MapMethod::kThinPlateSpline) {
+    // Its weights at a measured place are 1 and 0.
+    EXPECT_NEAR(there.dof, std::pow(0.01 + 0.04, 2) / (0.04 * 0.04 / 2 + 0.01 * 0.01 / 2), 1e-6);
+  }
+  const MapGrid grid = regular_grid(5);
+  EXPECT_EQ(sample(maps.delta_ct, grid).u95_percent, sample(known.delta_ct, grid).u95_percent);
 }
 
 TEST_P(Field, RefusesToExtrapolate) {

@@ -1,6 +1,7 @@
 #include "analysis/maps/map_input.h"
 
 #include "analysis/maps/field_data.h"
+#include "calibration/distributions.h"
 #include "published_input.h"
 
 #include <algorithm>
@@ -206,6 +207,43 @@ TEST(FieldData, TheErrorOfTheReferenceIsSharedByAll) {
   EXPECT_NEAR(data.covariance(7, 30) / std::sqrt(data.covariance(7, 7) * data.covariance(30, 30)), 1, 1e-9);
 }
 
+/// U of one source with 1 degree of freedom beside independent errors that are known.
+MapInput with_shared_u_of_one_dof() {
+  MapInput input = exact_input({.independent_percent = 0.05, .shared_u_percent = 0.1});
+  const auto n = static_cast<Index>(input.locations.size());
+  input.u_over_root_dof = {MatrixXd::Constant(n, n, 0.01)};
+  return input;
+}
+
+TEST(FieldData, MeasuredLocationsAreExpandedByStudentsT) {
+  const MapInput merged = merge_locations(with_shared_u_of_one_dof());
+  const double u = std::hypot(0.05, 0.1), dof = std::pow(u, 4) / 1e-4;  // Welch–Satterthwaite: 1.56
+  for (const MeasuredLocation& location : measured_locations(merged)) {
+    EXPECT_NEAR(location.uneven_thrust_u95_percent, student_t_quantile(0.975, dof) * u, 1e-9);
+    if (location.label != "OT") {
+      EXPECT_NEAR(location.delta_ct_u95_percent, 1.96 * 0.05 * std::sqrt(2), 0.01) << "known exactly";
+    }
+  }
+}
+
+TEST(FieldData, DegreesOfFreedomComeThroughMergingAndMirroring) {
+  MapInput input = with_shared_u_of_one_dof();
+  LocationEstimate image = input.locations[12];
+  image.label = "left";
+  image.y_norm = -image.y_norm;
+  image.u_percent = -image.u_percent;
+  MapInput more = with(input, image, 1e-4, 0.1);
+  const auto n = static_cast<Index>(more.locations.size());
+  more.u_over_root_dof[0].conservativeResizeLike(MatrixXd::Zero(n, n));
+  const FieldData data = uneven_thrust_data(merge_locations(more));
+  ASSERT_EQ(data.over_root_dof.size(), 1u);
+  // Of the two the share of the one is 0.1² / (0.05² + 0.1² + 0.1²): the better known weighs more.
+  const double share = 0.01 / (0.0025 + 0.01 + 0.01);
+  EXPECT_NEAR(data.over_root_dof[0](12, 12), 0.01 * share * share, 1e-9);
+  // What the two differ by tells of the shared error, so that the others are better known as well.
+  EXPECT_NEAR(data.over_root_dof[0](3, 5), 0.01 * (1 - share) * (1 - share), 1e-9);
+}
+
 TEST(FieldData, MirrorImagesAreOneObservation) {
   const MapInput input = exact_input();
   LocationEstimate image = input.locations[12];
@@ -217,7 +255,7 @@ TEST(FieldData, MirrorImagesAreOneObservation) {
   const FieldData data = uneven_thrust_data(merged);
   ASSERT_EQ(data.size(), 42);
   EXPECT_NEAR(data.values(12), input.locations[12].u_percent + 0.15, 1e-9);
-  EXPECT_EQ(measured_locations(merged, 1.96)[42].y_norm, image.y_norm);
+  EXPECT_EQ(measured_locations(merged)[42].y_norm, image.y_norm);
 }
 
 }  // namespace
