@@ -18,6 +18,12 @@ double autocovariance(const std::vector<double>& centred, std::size_t lag) {
   return sum / static_cast<double>(centred.size());
 }
 
+/// The deviation of a normal distribution that is as rare as t of Student's (Wallace 1959).
+double normal_of_student_t(double t, double dof) {
+  const double size = std::sqrt(dof * std::log1p(t * t / dof)) * (8 * dof + 1) / (8 * dof + 3);
+  return std::copysign(size, t);
+}
+
 }  // namespace
 
 double variance_of_mean(std::span<const double> series) {
@@ -56,10 +62,13 @@ Trend trend_of(std::span<const double> series) {
   std::vector<double> residual(series.begin(), series.end());
   for (std::size_t i = 0; i < residual.size(); ++i) residual[i] -= slope * (static_cast<double>(i) - centre);
   // var(slope) = s²/Σx² for independent residuals; the autocorrelation inflates it as it does the mean's
-  // variance.
-  const double error = std::sqrt(variance_of_mean(residual) * count / spread) * (count - 1);
+  // variance. That residuals alternate is chance in a short run, and makes no slope better known.
+  double squares = 0;
+  for (const double value : residual) squares += (value - mean) * (value - mean);
+  const double of_mean = std::max(variance_of_mean(residual), squares / (count * (count - 1)));
+  const double error = std::sqrt(of_mean * count * (count - 1) / ((count - 2) * spread)) * (count - 1);
   const double change = slope * (count - 1);
-  return {change, error > 0 ? change / error : 0};
+  return {change, error > 0 ? normal_of_student_t(change / error, count - 2) : 0};
 }
 
 }  // namespace tunnelrig

@@ -14,7 +14,9 @@ double variance_of_mean(std::span<const double> series);
 /// A straight line through an equally spaced series.
 struct Trend {
   double change = 0;  // last minus first, along the line
-  double z = 0;       // the change over its standard error, autocorrelation of the residuals included
+  /// The change over its standard error, autocorrelation of the residuals included; by Student's t, as the
+  /// deviation of a normal distribution that is as rare.
+  double z = 0;
 };
 Trend trend_of(std::span<const double> series);
 

@@ -26,7 +26,7 @@ struct ChannelStatistics {
   double std_V = 0;
   double standard_error_V = 0;  // of the mean, autocorrelation included
   double drift_V = 0;           // straight line through the run, end minus start
-  double drift_z = 0;           // the drift over its own standard error
+  double drift_z = 0;  // the drift over its own standard error, as a normal deviation whatever the blocks
   double lowest_V = 0;
   double highest_V = 0;
   std::uint64_t clipped = 0;  // samples at the end of the converter's range

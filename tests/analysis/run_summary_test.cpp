@@ -163,6 +163,28 @@ TEST(RunSummary, DriftIsSeenAndNoiseIsNot) {
   EXPECT_NEAR(statistics.channels[1].drift_V, 0.02, 0.002);
 }
 
+/// Eight blocks know their own scatter badly: one white run of a dozen was said to drift.
+TEST(RunSummary, AShortRunOfNoiseDoesNotDrift) {
+  constexpr int kRuns = 3000;
+  std::mt19937_64 engine(8);
+  std::normal_distribution<double> unit;
+  for (const std::size_t blocks : {8U, 20U, 200U}) {
+    int drifts = 0, beyond_95 = 0, seen = 0;
+    for (int run = 0; run < kRuns; ++run) {
+      std::vector<double> series(blocks);
+      for (double& value : series) value = unit(engine);
+      const double z = trend_of(series).z;
+      drifts += std::abs(z) > 4.5 ? 1 : 0;
+      beyond_95 += std::abs(z) > 1.96 ? 1 : 0;
+      for (std::size_t i = 0; i < blocks; ++i) series[i] += 40.0 * static_cast<double>(i);
+      seen += trend_of(series).z > 4.5 ? 1 : 0;
+    }
+    EXPECT_EQ(drifts, 0) << blocks;
+    EXPECT_NEAR(beyond_95, 0.045 * kRuns, 0.015 * kRuns) << blocks;
+    EXPECT_EQ(seen, kRuns) << blocks;
+  }
+}
+
 TEST(RunSummary, LinesAreFoundNamedAndMeasured) {
   std::mt19937_64 engine(9);
   std::normal_distribution<double> unit;
