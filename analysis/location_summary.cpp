@@ -26,6 +26,8 @@ struct SharedSource {
   Eigen::MatrixXd covariance;  // of the parameters
   double dof;
   Eigen::MatrixXd c_t, u;  // locations × parameters
+
+  bool has_dof() const { return std::isfinite(dof) && dof > 0; }
 };
 
 /// The place of a location in the order of the tables: columns from the centre, top to bottom, then open
@@ -304,12 +306,12 @@ LocationValue combine(const LocationMeans& means, std::size_t l, double noise_va
     const Eigen::RowVectorXd slope = (source.*slopes).row(row);
     const double part = slope * source.covariance * slope.transpose();
     variance += part;
-    if (std::isfinite(source.dof) && source.dof > 0) over_dof += part * part / source.dof;
+    if (source.has_dof()) over_dof += part * part / source.dof;
   }
   value.standard_uncertainty = std::sqrt(variance);
   value.dof = over_dof > 0 ? variance * variance / over_dof
                            : std::numeric_limits<double>::infinity();  // Welch–Satterthwaite
-  value.u95 = student_t_quantile(0.975, value.dof) * value.standard_uncertainty;
+  value.u95 = half_width_95(value.standard_uncertainty, value.dof);
   if (!known) value.standard_uncertainty = value.u95 = std::numeric_limits<double>::quiet_NaN();
   return value;
 }
@@ -324,7 +326,7 @@ std::vector<Eigen::MatrixXd> over_root_dof(const LocationMeans& means,
     scale(l) = std::pow(means.dof[static_cast<std::size_t>(l)], -0.25);  // 0 where they are infinite
   std::vector<Eigen::MatrixXd> scaled{scale.asDiagonal() * means.covariance * scale.asDiagonal()};
   for (const SharedSource& source : sources) {
-    if (!std::isfinite(source.dof) || source.dof <= 0) continue;
+    if (!source.has_dof()) continue;
     scaled.emplace_back(source.*slopes * source.covariance * (source.*slopes).transpose() /
                         std::sqrt(source.dof));
   }

@@ -71,6 +71,10 @@ double student_t_quantile(double p, double dof) {
   return p < 0.5 ? -t : t;
 }
 
+double half_width_95(double standard_error, double dof) {
+  return student_t_quantile(0.975, dof) * standard_error;
+}
+
 double f_upper_p(double f, double dof1, double dof2) {
   assert(f >= 0 && dof1 > 0 && dof2 > 0);
   if (std::isinf(f)) return 0;

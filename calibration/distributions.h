@@ -13,6 +13,9 @@ double student_t_two_sided_p(double t, double dof);
 /// t with P(T ≤ t) = p, 0 < p < 1; relative error below 1e-8.
 double student_t_quantile(double p, double dof);
 
+/// Half width of the 95 % interval of an estimate with this standard error: t(0.975, dof) times it.
+double half_width_95(double standard_error, double dof);
+
 /// P(F > f) of Fisher's F, f ≥ 0; dof2 above 1e6 counts as infinite (relative error of order dof1 f / dof2).
 double f_upper_p(double f, double dof1, double dof2);
 

@@ -107,12 +107,10 @@ std::optional<std::string> common_speed(Sheet& all, const std::vector<SweepColum
   }
   if (first == nullptr) return speed_column(all);
   if (other == nullptr) return first->speed;
-  if (unit_in_header(*first->speed) != unit_in_header(*other->speed))
-    throw InputError::at(other->file, 1, "its speed is {}, that of {} is {}: import them apart",
-                         *other->speed, first->file, *first->speed);
-  if (options.pole_count)
-    throw InputError::at(other->file, 1, "--pole-count: its speed is {}, that of {} is {}: import them apart",
-                         *other->speed, first->file, *first->speed);
+  const bool one_unit = unit_in_header(*first->speed) == unit_in_header(*other->speed);
+  if (!one_unit || options.pole_count)
+    throw InputError::at(other->file, 1, "{}its speed is {}, that of {} is {}: import them apart",
+                         one_unit ? "--pole-count: " : "", *other->speed, first->file, *first->speed);
   const std::string name = fmt::format("{} ({})", kSpeed, unit_in_header(*first->speed));
   const std::size_t index = all.ensure(name);
   for (std::size_t row = 0; row < all.rows.size(); ++row) {

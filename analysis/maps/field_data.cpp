@@ -1,7 +1,7 @@
 #include "analysis/maps/field_data.h"
 
 #include "analysis/maps/coincident.h"
-#include "analysis/maps/field_estimate.h"
+#include "calibration/distributions.h"
 
 #include <algorithm>
 #include <cmath>
@@ -112,8 +112,8 @@ std::vector<MeasuredLocation> measured_locations(const MapInput& merged) {
   const Estimates change = thrust_change(merged).estimates;
   const auto u95 = [&](const MatrixXd& covariance, const std::vector<MatrixXd>& over_root_dof, Index i) {
     const double variance = std::max(0.0, covariance(i, i));
-    return expanded(std::sqrt(variance),
-                    effective_dof(over_root_dof, VectorXd::Unit(covariance.rows(), i), variance));
+    return half_width_95(std::sqrt(variance),
+                         effective_dof(over_root_dof, VectorXd::Unit(covariance.rows(), i), variance));
   };
   std::vector<MeasuredLocation> locations;
   for (const LocationEstimate& location : merged.locations) {

@@ -7,11 +7,7 @@
 
 namespace tunnelrig {
 
-double expanded(double standard_uncertainty, double dof) {
-  return student_t_quantile(0.975, dof) * standard_uncertainty;
-}
-
-double FieldEstimate::u95() const { return expanded(standard_uncertainty, dof); }
+double FieldEstimate::u95() const { return half_width_95(standard_uncertainty, dof); }
 
 LeaveOneOutSummary summarize(const std::vector<LeftOut>& left_out) {
   if (left_out.empty()) return {};

@@ -24,9 +24,6 @@ struct FieldEstimate {
   double u95() const;  // half width of the 95 % interval
 };
 
-/// Half width of the 95 % interval: Student's t times the standard uncertainty.
-double expanded(double standard_uncertainty, double dof);
-
 /// One location, predicted by the field fitted with the same hyperparameters to all others; per cent.
 struct LeftOut {
   std::string label;

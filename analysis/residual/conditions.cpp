@@ -222,14 +222,14 @@ std::string wilder_runs(const Observations& observations) {
                      scatter.maxCoeff());
 }
 
-/// "what rotors 1 and 4 differ by from 2 and 3 scatters 2.9 times as much as …"
+/// "differences of rotors scatter unlike each other (…, rotors 1 + 3 − 2 − 4: 0.62, …)"
 std::string unlike_contrasts(const Observations& observations) {
-  const Eigen::MatrixXd modes =
-      MixedModel::baseline_alone(observations, observations.all_rows()).mode_matrix();
+  const Eigen::MatrixXd modes = modes_of(observations.scatter, observations.channels());
   std::vector<std::string> contrasts;
   for (Eigen::Index k = 0; k < observations.scatter.contrasts.size(); ++k) {
     std::array<std::vector<int>, 2> sides;
-    for (int rotor = 0; rotor < 4; ++rotor) sides[modes(rotor, k + 1) > 0 ? 0 : 1].push_back(rotor + 1);
+    for (int rotor = 0; rotor < modes.rows(); ++rotor)
+      sides[modes(rotor, k + 1) > 0 ? 0 : 1].push_back(rotor + 1);
     contrasts.push_back(fmt::format("{} − {}: {:.2f}", fmt::join(sides[0], " + "), fmt::join(sides[1], " − "),
                                     observations.scatter.contrasts(k)));
   }

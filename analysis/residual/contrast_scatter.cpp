@@ -14,9 +14,8 @@ using Eigen::VectorXd;
 /// a single wild run does not decide.
 VectorXd unlikeness(const MixedModel& model, std::size_t stratum, std::size_t ratio, Stacked column) {
   model.project(stratum, ratio, column);
-  const Index modes = model.strata()[stratum].modes;
   const VectorXd log =
-      column.reshaped(column.size() / modes, modes).cwiseAbs().colwise().mean().array().log();
+      by_mode(column, model.strata()[stratum].modes).cwiseAbs().colwise().mean().array().log();
   return log.array() - log.mean();
 }
 

@@ -221,8 +221,7 @@ UnknownStructure describe_sessions(const Observations& observations, const Matri
   double lowest = 1e300, highest = -1e300;
   for (const auto& [block, values] : offsets) {
     const double mean = mean_of(values);
-    const double half =
-        student_t_quantile(0.975, free) * std::sqrt(squares / free / static_cast<double>(values.size()));
+    const double half = half_width_95(std::sqrt(squares / free / static_cast<double>(values.size())), free);
     result.shape.push_back({static_cast<double>(block + 1), mean, mean - half, mean + half});
     lowest = std::min(lowest, mean);
     highest = std::max(highest, mean);

@@ -125,7 +125,7 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
       const double error = std::sqrt((n - 1) / n * squares);
       const bool theory = k == 0 && fit.model.terms[t].at_theory;
       const double value = theory ? fit.model.terms[t].parameters[k] : centre.terms[t].parameters[k];
-      const double middle = centre.terms[t].parameters[k], half = student_t_quantile(0.975, n - 1) * error;
+      const double middle = centre.terms[t].parameters[k], half = half_width_95(error, n - 1);
       // No time is below zero. What an amplitude's interval says of its sign stays said.
       const bool bounded = parameter.role == ParameterRole::kShape;
       result[t].push_back({.name = parameter.name,

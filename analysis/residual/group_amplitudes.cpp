@@ -108,8 +108,7 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
     if (dof < 1 || !(seen.norm() > kLeastSeen * items.col(k).norm())) continue;
     const double amplitude = seen.dot(rest) / seen.squaredNorm();
     const double variance = (rest - amplitude * seen).squaredNorm() / static_cast<double>(dof);
-    const double half =
-        student_t_quantile(0.975, static_cast<double>(dof)) * std::sqrt(variance / seen.squaredNorm());
+    const double half = half_width_95(std::sqrt(variance / seen.squaredNorm()), static_cast<double>(dof));
     result.push_back({observations.group_name[static_cast<std::size_t>(group)], amplitude, amplitude - half,
                       amplitude + half});
   }

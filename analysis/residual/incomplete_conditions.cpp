@@ -92,7 +92,7 @@ Explanation without_names_of_incomplete(Explanation explanation, const Observati
   if (incomplete.empty() || explanation.verdict == "insufficient") return explanation;
   const Observations complete = with_all(observations, incomplete);
   if (complete.rows() == 0) return explanation;
-  const Explanation there = explain_once(complete, effects, settings);
+  Explanation there = explain_once(complete, effects, settings);
   const std::vector<std::string> found = found_with(there, incomplete);
   if (found.empty()) return explanation;
 
@@ -112,7 +112,7 @@ Explanation without_names_of_incomplete(Explanation explanation, const Observati
     again.untestable = std::move(explanation.untestable);
     explanation = std::move(again);
   }
-  for (UnknownStructure& unknown : structure_over(incomplete, complete, there, effects, settings))
+  for (UnknownStructure& unknown : structure_over(incomplete, complete, std::move(there), effects, settings))
     explanation.unknown.push_back(std::move(unknown));
   explanation.verdict = verdict_of(explanation);
   said.push_back(fmt::format("in the {} of {} {} that have {}, {} is found{}: fill in what is missing",

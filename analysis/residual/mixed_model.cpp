@@ -35,11 +35,6 @@ MatrixXd orthonormal_modes(Index channels) {
   return orthonormal_from(VectorXd::Ones(channels));
 }
 
-MatrixXd modes_of(const RunScatter& scatter, Index channels) {
-  if (scatter.sessions.modes.size() > 0) return scatter.sessions.modes;
-  return scatter.rotors.size() > 0 ? modes_of_unlike(scatter.rotors) : orthonormal_modes(channels);
-}
-
 /// (DΦD + a 11ᵀ)^(−½) = (I − share w wᵀ) A D⁻¹, block by block: D⁻¹ divides each run by its scatter, A =
 /// Φ^(−½) takes from it what the one before foretells, and w is what both make of 1.
 class Root {
@@ -114,6 +109,14 @@ class Root {
 
 }  // namespace
 
+MatrixXd modes_of(const RunScatter& scatter, Index channels) {
+  MatrixXd modes = scatter.sessions.modes.size() > 0 ? scatter.sessions.modes
+                   : scatter.rotors.size() > 0       ? modes_of_unlike(scatter.rotors)
+                                                     : orthonormal_modes(channels);
+  if (modes(0, 0) < 0) modes *= -1;
+  return modes;
+}
+
 void whiten(const std::vector<std::vector<Index>>& blocks, const VectorXd& scatter, double session_ratio,
             double run_correlation,
             Eigen::Ref<MatrixXd> columns) {  // NOLINT(performance-unnecessary-value-param): written through
@@ -141,7 +144,6 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
       run_correlation_(scatter.run_correlation),
       alike_(VectorXd::Ones(static_cast<Index>(rows_.size()))),
       scatter_(scatter.of_runs(rows_)) {
-  if (modes_(0, 0) < 0) modes_ *= -1;
   rotors_of_modes_ = scatter.rotors_differ() ? MatrixXd(modes_.inverse()) : modes_.transpose();
   const int channels = static_cast<int>(observations.channels()),
             alone = scatter.contrasts.size() > 0 ? channels : scatter.sessions.alone;

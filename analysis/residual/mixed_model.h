@@ -30,6 +30,14 @@ inline constexpr std::array<double, 9> kRatios = {0, 0.05, 0.15, 0.4, 1, 2.5, 6,
 /// Columns, each stacked over the modes of one stratum: (runs · modes) × columns.
 using Stacked = Eigen::MatrixXd;
 
+/// A stacked column as runs × modes.
+inline auto by_mode(const Stacked& column, Eigen::Index modes) {
+  return column.reshaped(column.size() / modes, modes);
+}
+
+/// By which rows of `channels` rotors are multiplied, where they scatter like that: MixedModel::mode_matrix.
+Eigen::MatrixXd modes_of(const RunScatter& scatter, Eigen::Index channels);
+
 /// (DΦD + a 11ᵀ)^(−½), by which columns (a row for each run) are multiplied in place, block by block; the
 /// runs of a block in order of time. `scatter`: d of each row.
 void whiten(const std::vector<std::vector<Eigen::Index>>& blocks, const Eigen::VectorXd& scatter,

@@ -44,8 +44,7 @@ VectorXd unlikeness(const MatrixXd& rotors, const std::vector<Index>& alike) {
 MatrixXd differences(const MixedModel& model, std::size_t stratum, std::size_t ratio, Stacked column) {
   model.project(stratum, ratio, column);
   const Index modes = model.strata()[stratum].modes;
-  return Eigen::Map<const MatrixXd>(column.data(), column.size() / modes, modes) *
-         model.rotors_of_modes().bottomRows(modes);
+  return by_mode(column, modes) * model.rotors_of_modes().bottomRows(modes);
 }
 
 }  // namespace

@@ -64,8 +64,7 @@ class Differences {
     const Index modes = model_.strata()[stratum_].modes;
     model_.project(stratum_, 0, column);
     const Stacked coordinates = sessions_.coordinates(column);
-    return {column.reshaped(column.size() / modes, modes) * basis,
-            coordinates.reshaped(coordinates.size() / modes, modes) * basis};
+    return {by_mode(column, modes) * basis, by_mode(coordinates, modes) * basis};
   }
 
   /// `direction`: in the basis, of length 1. Only a larger variance is asked for.

@@ -26,7 +26,7 @@ std::optional<double> u95_of(const std::vector<double>& series) {
     square += value * value / n;
   }
   const double independent = std::max(2.0, (square - sum * sum) / of_mean);
-  return student_t_quantile(0.975, std::min(independent - 1, n)) * std::sqrt(of_mean);
+  return half_width_95(std::sqrt(of_mean), std::min(independent - 1, n));
 }
 
 }  // namespace
