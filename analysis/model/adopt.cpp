@@ -119,8 +119,13 @@ Adoption adopt(const Observations& observations, const Explanation& explanation,
                      .dof = jackknife_dof(observations),
                      .explanation = explanation_json(explanation)};
   const bool curves_wanted = empirical && !explanation.model.curves.empty();
+  for (const Curve& curve : explanation.by_sealed_too)
+    result.notes.push_back(
+        fmt::format("the curve over {} is not adopted: it took the sealed blocks to see it, and none are "
+                    "left to score it by",
+                    curve.label()));
   if (explanation.adopted.empty() && !curves_wanted) {
-    if (!explanation.unknown.empty())
+    if (explanation.unknown.size() > explanation.by_sealed_too.size())
       result.notes.emplace_back("what was found has no name; --adopt-empirical adopts it as a curve");
     return result;
   }

@@ -36,6 +36,22 @@ Attribution Search::run() {
   return std::move(result_);
 }
 
+StructureLeft Search::run_on_top_of(const Attribution& found) {
+  make_models();
+  result_.accepted = found.accepted;
+  result_.curves = found.curves;
+  fit_ = fit_jointly(observations_, found.final.model, rows_);
+  constexpr std::uint64_t kOther = 2000;
+  salt_ = kOther;  // other data sets than the search before has drawn
+  const std::size_t before = result_.curves.size();
+  while (static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve(scan_curves())) {
+  }
+  smooth_curves(before);
+  return {.curves = {result_.curves.begin() + static_cast<std::ptrdiff_t>(before), result_.curves.end()},
+          .fit = std::move(fit_),
+          .rounds = std::move(result_.curve_rounds)};
+}
+
 void Search::begin() {
   RunScatter scatter = std::move(observations_.scatter);
   observations_ = given_;
@@ -112,6 +128,11 @@ double deviates(double evidence) {
 Attribution attribute(const Observations& observations, const std::vector<int>& rows,
                       const std::vector<const Effect*>& effects, const SearchSettings& settings) {
   return Search(observations, rows, effects, settings).run();
+}
+
+StructureLeft structure_left(const Attribution& found, const std::vector<int>& rows,
+                             const SearchSettings& settings) {
+  return Search(found.observations, rows, {}, settings).run_on_top_of(found);
 }
 
 }  // namespace tunnelrig

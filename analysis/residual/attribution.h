@@ -98,4 +98,14 @@ double detectable_by_one(const MixedModel& mixed, const NullFit& variances, doub
 Attribution attribute(const Observations& observations, const std::vector<int>& rows,
                       const std::vector<const Effect*>& effects, const SearchSettings& settings);
 
+/// Structure without a name that more runs show beside what was found on some of them.
+struct StructureLeft {
+  std::vector<FoundCurve> curves;
+  JointFit fit;               // to all `rows`: what was found, and then these curves
+  std::vector<Round> rounds;  // of the search
+};
+/// `found` speaks of its own observations, which must outlive the call.
+StructureLeft structure_left(const Attribution& found, const std::vector<int>& rows,
+                             const SearchSettings& settings);
+
 }  // namespace tunnelrig

@@ -71,6 +71,7 @@ struct UnknownStructure {
   bool levels = false;                  // the shape is one of few values, and nothing lies between them
   std::vector<std::string> labels;      // of a column of texts: x = i + 1 stands for labels[i]
   std::vector<std::string> instead_of;  // effects over this covariate that do not follow it
+  bool by_sealed_too = false;           // the open blocks alone do not show it
 };
 
 struct Untestable {
@@ -105,6 +106,7 @@ struct Explanation {
   // what the pages show beside it
   std::vector<Round> rounds, curve_rounds;
   MeanModel model;                                  // fitted to all runs
+  std::vector<Curve> by_sealed_too;                 // no part of `model`, since nothing is left to score them
   RunScatter scatter;                               // that they were found to have
   Eigen::MatrixXd residual_before, residual_after;  // n × c, unit of the response
 };

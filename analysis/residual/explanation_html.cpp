@@ -209,7 +209,9 @@ class Page {
   }
 
   void add_unknown(const UnknownStructure& unknown, Json& list) const {
-    for (const Curve& curve : explanation_.model.curves) {
+    std::vector<Curve> curves = explanation_.model.curves;
+    curves.insert(curves.end(), explanation_.by_sealed_too.begin(), explanation_.by_sealed_too.end());
+    for (const Curve& curve : curves) {
       if (curve.covariate != unknown.condition || curve.rotor != unknown.rotor ||
           curve.in_place() != unknown.place || curve.times() != unknown.times || curve.x.size() == 0)
         continue;

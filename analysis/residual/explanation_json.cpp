@@ -61,7 +61,8 @@ Json unknown_json(const UnknownStructure& unknown) {
           {"amplitude", finite(unknown.amplitude)},
           {"shape", shape},
           {"labels", unknown.labels},
-          {"instead_of", unknown.instead_of}};
+          {"instead_of", unknown.instead_of},
+          {"by_sealed_too", unknown.by_sealed_too}};
 }
 
 }  // namespace

@@ -98,6 +98,9 @@ std::string in_words(const UnknownStructure& u, const std::string& unit) {
     text += fmt::format(
         "    in proportion to how far {0} is from its mean; drawn as it is where {0} is farthest\n", u.times);
   if (u.levels) text += wrapped("  " + levels_in_words(u, unit));
+  if (u.by_sealed_too)
+    text +=
+        "    only with the sealed blocks in: the others are too few to show it, so it is not in the errors\n";
   if (!u.instead_of.empty())
     text += fmt::format("    in which it bends away from the formula of {}\n", fmt::join(u.instead_of, ", "));
   return text;

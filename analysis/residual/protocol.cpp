@@ -282,7 +282,22 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
   explanation.after.rmse = rms(residuals(wide, shown, seal.open));
 }
 
-void estimate_on_all(const Models& models, const Observations& observations, Explanation& explanation) {
+/// Names are settled, but a structure that the open blocks are too few for is one all the same.
+void report_structure_left(const StructureLeft& left, const Observations& observations,
+                           const std::vector<int>& rows, Explanation& explanation) {
+  for (const FoundCurve& curve : left.curves) {
+    explanation.unknown.push_back(describe(observations, left.fit, curve, rows));
+    explanation.unknown.back().by_sealed_too = true;
+    explanation.by_sealed_too.push_back(curve.curve);
+  }
+  for (Round round : left.rounds) {
+    round.outcome = "all blocks, the sealed ones too: " + round.outcome;
+    explanation.curve_rounds.push_back(std::move(round));
+  }
+}
+
+void estimate_on_all(const Models& models, const Observations& observations, const SearchSettings& settings,
+                     Explanation& explanation) {
   const auto& [wide, alone, found] = models;
   const std::vector<int> rows = observations.all_rows();
   std::vector<ChangePoint> change_points;
@@ -305,7 +320,8 @@ void estimate_on_all(const Models& models, const Observations& observations, Exp
   warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);
   for (const FoundCurve& curve : found.curves)
     explanation.unknown.push_back(describe(wide, whole, curve, rows));
-  if (found.session_unknown && found.curves.empty())
+  report_structure_left(structure_left(found, rows, settings), wide, rows, explanation);
+  if (found.session_unknown && explanation.unknown.empty())
     explanation.unknown.push_back(
         describe_sessions(observations, fitted.error, *found.session_unknown, rows));
   explanation.suspect_rows =
@@ -350,7 +366,7 @@ Explanation explain_once(const Observations& observations, const std::vector<con
   const Models models{found.observations, alone, found};
   open_seal(models, seal, settings, explanation);
   settings.progress("estimating parameters");
-  estimate_on_all(models, observations, explanation);
+  estimate_on_all(models, observations, settings, explanation);
   warn_of_companions(found.observations, effects, explanation);
   explanation.verdict = verdict_of(explanation);
   return explanation;

@@ -21,6 +21,8 @@ class Search {
   Search(const Observations& observations, const std::vector<int>& rows,
          const std::vector<const Effect*>& effects, const SearchSettings& settings);
   Attribution run();
+  /// Curves alone, on top of what was found on other runs of the same observations.
+  StructureLeft run_on_top_of(const Attribution& found);
 
  private:
   struct Scan {
@@ -146,7 +148,7 @@ class Search {
   bool add_best_curve(const CurveScan& curves);
   /// Waves find structure of any shape, but a straight line in them has bends, and a bend has its middle at
   /// that of the range: what they found becomes a smooth curve of as many columns as the data ask for.
-  void smooth_curves();
+  void smooth_curves(std::size_t first = 0);
   /// A name whose work a curve does as well was the wrong name for that curve.
   void drop_what_a_curve_replaces();
   /// Whether an effect is beyond chance among all candidates with the curves in: what was found while their

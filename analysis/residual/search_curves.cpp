@@ -88,8 +88,8 @@ void Search::add_curve(const Curve& curve, double p) {
   read_back_terms();
 }
 
-void Search::smooth_curves() {
-  for (std::size_t c = 0; c < result_.curves.size(); ++c) {
+void Search::smooth_curves(std::size_t first) {
+  for (std::size_t c = first; c < result_.curves.size(); ++c) {
     const std::vector<Curve> forms = smooth_forms(observations_, result_.curves[c].curve, rows_);
     if (forms.empty()) continue;
     MeanModel rest = fit_.model;
