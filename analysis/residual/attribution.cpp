@@ -43,13 +43,18 @@ StructureLeft Search::run_on_top_of(const Attribution& found) {
   fit_ = fit_jointly(observations_, found.final.model, rows_);
   constexpr std::uint64_t kOther = 2000;
   salt_ = kOther;  // other data sets than the search before has drawn
+  StructureLeft left;
+  for (std::size_t t = 0; t < result_.accepted.size(); ++t)
+    if (bends_away(t)) left.bent.insert(t);
   const std::size_t before = result_.curves.size();
-  while (static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve(scan_curves())) {
-  }
+  while (static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve(scan_curves()))
+    for (std::size_t t = 0; t < result_.accepted.size(); ++t)
+      if (outshone_by_curve(result_.accepted[t].term)) left.bent.insert(t);
   smooth_curves(before);
-  return {.curves = {result_.curves.begin() + static_cast<std::ptrdiff_t>(before), result_.curves.end()},
-          .fit = std::move(fit_),
-          .rounds = std::move(result_.curve_rounds)};
+  left.curves = {result_.curves.begin() + static_cast<std::ptrdiff_t>(before), result_.curves.end()};
+  left.fit = std::move(fit_);
+  left.rounds = std::move(result_.curve_rounds);
+  return left;
 }
 
 void Search::begin() {

@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -101,8 +102,9 @@ Attribution attribute(const Observations& observations, const std::vector<int>& 
 /// Structure without a name that more runs show beside what was found on some of them.
 struct StructureLeft {
   std::vector<FoundCurve> curves;
-  JointFit fit;               // to all `rows`: what was found, and then these curves
-  std::vector<Round> rounds;  // of the search
+  JointFit fit;                // to all `rows`: what was found, and then these curves
+  std::vector<Round> rounds;   // of the search
+  std::set<std::size_t> bent;  // of `accepted`: what its covariate does bends away from its formula
 };
 /// `found` speaks of its own observations, which must outlive the call.
 StructureLeft structure_left(const Attribution& found, const std::vector<int>& rows,

@@ -50,6 +50,7 @@ struct AdoptedEffect {
   double p_value = 1;
   double held_out_gain = 0;  // unit of the response
   bool at_bound = false;     // of the amplitude, with the sealed runs in
+  bool bends_away = false;   // likewise: what its covariate does is not its formula
   std::vector<std::string> confounded_with;
   std::optional<SeparatingRun> separating_run;
 };

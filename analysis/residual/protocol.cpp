@@ -285,6 +285,7 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
 /// Names are settled, but a structure that the open blocks are too few for is one all the same.
 void report_structure_left(const StructureLeft& left, const Observations& observations,
                            const std::vector<int>& rows, Explanation& explanation) {
+  for (const std::size_t t : left.bent) explanation.adopted[t].bends_away = true;
   for (const FoundCurve& curve : left.curves) {
     explanation.unknown.push_back(describe(observations, left.fit, curve, rows));
     explanation.unknown.back().by_sealed_too = true;

@@ -158,6 +158,8 @@ class Search {
   /// formula may leave: then the effect was only the curve's straight part.
   bool outshone_by_curve(const Term& term) const;
   Eigen::MatrixXd made_by_newest_curve() const;
+  /// Whether a bend over its own covariate is there beside accepted effect t, and has that much of its size.
+  bool bends_away(std::size_t t);
   void add_curve(const Curve& curve, double p);
   /// Whether a curve over the same covariate and rotor is in, or over one that goes with it.
   bool is_described(const Curve& curve) const;

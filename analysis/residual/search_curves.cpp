@@ -205,6 +205,34 @@ Eigen::MatrixXd Search::made_by_newest_curve() const {
   return made;
 }
 
+bool Search::bends_away(std::size_t t) {
+  const Term& term = result_.accepted[t].term;
+  if (term.per_group || term.effect->theory_only) return false;
+  CurveScan bends;
+  for (const Curve& curve : curves_) {
+    if (!is_bend_over(curve, conditions_of(*term.effect), term.rotor) || is_described(curve)) continue;
+    Curve bend = without_trend(curve, rows_);
+    if (!mixed_->sees(bend.columns[0])) continue;
+    bends.scan.candidates.push_back(as_candidate(bend));
+    bends.tried.push_back(std::move(bend));
+  }
+  if (bends.tried.empty()) return false;
+  rank(fit_, bends.scan);
+  const std::size_t best = bends.scan.order[0];
+  NullMaxima maxima(*bends.scan.scan, fit_.variances,
+                    sizes_beside(fit_, bends.scan.candidates[best], bends.scan.fits[best]), settings_,
+                    5000 + ++salt_);
+  const double p = maxima.p(bends.scan.fits[best].evidence);
+  if (p > settings_.alpha / 2) return false;  // one question of each name, not the largest of many
+  const JointFit without = fit_;
+  add_curve(bends.tried[best], p);
+  const bool bent = outshone_by_curve(result_.accepted[t].term);
+  result_.curves.pop_back();
+  fit_ = without;
+  read_back_terms();
+  return bent;
+}
+
 std::optional<int> Search::session_scatter_is_large() const {
   const RotorSessions& unlike = observations_.scatter.sessions;
   std::optional<int> rotor;
