@@ -163,7 +163,12 @@ class RawImport {
  public:
   RawImport(CampaignFile& file, fs::path folder, const CampaignInfo& info, const ImportOptions& options,
             ImportSummary& summary)
-      : file_(file), folder_(std::move(folder)), info_(info), options_(options), summary_(summary) {}
+      : file_(file),
+        folder_(std::move(folder)),
+        info_(info),
+        options_(options),
+        summary_(summary),
+        volts_(info) {}
 
   void add(const Run& run) {
     const fs::path path = raw_path(folder_, run);
@@ -186,6 +191,7 @@ class RawImport {
 
   void finish() {
     while (!in_work_.empty()) settle_oldest();
+    for (const std::string& doubt : volts_.doubts()) summary_.doubts.push_back(doubt);
   }
 
  private:
@@ -209,6 +215,7 @@ class RawImport {
     RunStatistics statistics = raw->statistics.get();
     statistics.hash = raw->hash;
     check_statistics(statistics, info_, raw->npy.format(), raw->run, options_.allow_stuck);
+    volts_.look_at(raw->run, raw->npy.format(), statistics);
     store_statistics(file_, raw->id, statistics);
     summary_.raw_runs += 1;
     summary_.frames += raw->npy.frames();
@@ -220,6 +227,7 @@ class RawImport {
   const CampaignInfo& info_;
   const ImportOptions& options_;
   ImportSummary& summary_;
+  VoltDoubt volts_;
   std::deque<std::unique_ptr<RunInWork>> in_work_;
 };
 

@@ -1,11 +1,11 @@
 #include "datasets/import_doubts.h"
 
 #include "datasets/locations.h"
+#include "datasets/plausible.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 
 #include <fmt/format.h>
 
@@ -34,14 +34,9 @@ void doubt_labels(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doub
 /// Thrusts in grams, or of another rotor.
 void doubt_thrusts(const CampaignInfo& info, const Sheet& sheet, const std::vector<Run>& runs,
                    Doubts& doubts) {
-  constexpr double kSeaLevel_kg_m3 = 1.2;
-  constexpr double kMostCoefficient = 0.3;  // T/(½ρΩ²R²A): the most loaded rotors stay below 0.1
   for (const Run& run : runs) {
-    const double speed_rad_s =
-        run.number("speed_rpm").value_or(info.rig.nominal_speed_rpm) * std::numbers::pi / 30;
-    const double tip_m_s = speed_rad_s * info.rig.propeller_radius_m;
     const double largest_N =
-        kMostCoefficient * 0.5 * kSeaLevel_kg_m3 * tip_m_s * tip_m_s * info.rig.rotor_area_m2;
+        most_rotor_thrust_N(info.rig, run.number("speed_rpm").value_or(info.rig.nominal_speed_rpm));
     for (int rotor = 0; rotor < info.rig.rotors; ++rotor) {
       const auto thrust_N = run.thrust_N[static_cast<std::size_t>(rotor)];
       if (!thrust_N || !(largest_N > 0) || std::abs(*thrust_N) <= largest_N) continue;
@@ -76,6 +71,27 @@ std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& ru
   doubt_thrusts(info, runs_sheet, runs, doubts);
   doubt_places(runs_sheet, runs, doubts);
   return doubts;
+}
+
+void VoltDoubt::look_at(const Run& run, const RawFormat& format, const RunStatistics& statistics) {
+  if (is_counts(format.type)) return;  // beyond their range they are refused
+  for (std::size_t c = 0; c < static_cast<std::size_t>(info_.rig.rotors); ++c) {
+    const ChannelStatistics& channel = statistics.channels[c];
+    const double furthest_V =
+        std::abs(channel.lowest_V) > std::abs(channel.highest_V) ? channel.lowest_V : channel.highest_V;
+    if (!beyond_converter(info_.daq, furthest_V)) continue;
+    if (++runs_ == 1)
+      first_ = fmt::format(
+          "runs.csv:{}: run {}: channel {} of {} holds {:g} V, beyond the converter's reference of {:g} V "
+          "(daq.adc_reference_V): are these volts (not counts or mV)?",
+          run.line, run.run, c + 1, run.raw, furthest_V, info_.daq.adc_reference_V);
+    return;
+  }
+}
+
+Doubts VoltDoubt::doubts() const {
+  if (runs_ == 0) return {};
+  return {first_ + (runs_ > 1 ? fmt::format(" It is so in {} runs", runs_) : "")};
 }
 
 }  // namespace tunnelrig

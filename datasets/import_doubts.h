@@ -2,7 +2,10 @@
 #pragma once
 
 #include "datasets/campaign.h"
+#include "datasets/raw_data.h"
+#include "datasets/run_statistics.h"
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -12,5 +15,20 @@ namespace tunnelrig {
 /// that one text makes a label, thrusts that no rotor of this size gives, a location at two places.
 std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& runs_sheet,
                                        const std::vector<Run>& runs);
+
+/// Recordings of floating point, which are volts by the format: looks whether the converter can have read
+/// them. One sentence says it for all, with the first run.
+class VoltDoubt {
+ public:
+  explicit VoltDoubt(const CampaignInfo& info) : info_(info) {}
+
+  void look_at(const Run& run, const RawFormat& format, const RunStatistics& statistics);
+  std::vector<std::string> doubts() const;
+
+ private:
+  const CampaignInfo& info_;
+  std::string first_;
+  std::size_t runs_ = 0;
+};
 
 }  // namespace tunnelrig

@@ -99,6 +99,26 @@ INSTANTIATE_TEST_SUITE_P(All, FolderTypes,
                                          SampleType::kFloat64),
                          [](const auto& type) { return std::string(name_of(type.param)); });
 
+TEST_F(Folder, MillivoltsAreDoubted) {
+  const RawFormat format{SampleType::kFloat64, 4};
+  auto frames = test::example_frames(400, 1, format);
+  campaign.write(source);
+  test::write_npy(source / "raw/R2.npy", format, 400, frames);
+  EXPECT_THAT(import_campaign_folder(source, db, options()).doubts, testing::IsEmpty());
+  for (std::size_t at = 0; at < frames.size(); at += sizeof(double)) {
+    double value = 0;
+    std::memcpy(&value, frames.data() + at, sizeof(value));
+    value *= 1000;
+    std::memcpy(frames.data() + at, &value, sizeof(value));
+  }
+  for (const char* raw : {"raw/R1.npy", "raw/R2.npy", "raw/R3.npy"})
+    test::write_npy(source / raw, format, 400, frames);
+  EXPECT_THAT(import_campaign_folder(source, folder / "mV.db", options()).doubts,
+              testing::ElementsAre(testing::AllOf(
+                  HasSubstr("runs.csv:2: run R1: channel 1 of raw/R1.npy holds 2"), HasSubstr("in 3 runs"))))
+      << "and the calibration is not blamed for what they become";
+}
+
 TEST_F(Folder, StatisticsAreStoredWithTheHashOfTheirData) {
   campaign.write(source, 4000);
   const ImportSummary summary = import_campaign_folder(source, db, options());

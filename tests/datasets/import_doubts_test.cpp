@@ -1,5 +1,7 @@
 #include "datasets/import_doubts.h"
 
+#include <utility>
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -55,6 +57,45 @@ TEST(ImportDoubts, GramsAreNoNewtons) {
   EXPECT_THAT(
       doubts(kToml, runs("fan_rpm", kNumbers, "700,7,7,7")),
       ElementsAre(HasSubstr("runs.csv:2: column thrust_1_N: 700 N is more than a rotor of 0.15 m radius")));
+}
+
+/// The area of the thrust coefficient is a convention; what a rotor gives is not.
+TEST(ImportDoubts, TheLargestThrustIsThatOfTheDisc) {
+  std::string toml = kToml;
+  toml.insert(toml.find("[tunnel]"), "rotor_area_m2 = 0.005\n");
+  EXPECT_THAT(doubts(toml, runs("fan_rpm", kNumbers)), IsEmpty());
+}
+
+/// What is said of runs of four channels, each between two values.
+std::vector<std::string> volt_doubts(const std::vector<std::pair<double, double>>& runs_V,
+                                     SampleType type = SampleType::kFloat64) {
+  const CampaignInfo info = parse_campaign_toml(kToml, "campaign.toml");
+  VoltDoubt doubt(info);
+  int line = 2;
+  for (const auto& [lowest_V, highest_V] : runs_V) {
+    Run run;
+    run.run = fmt::format("R{}", line);
+    run.raw = fmt::format("raw/R{}.npy", line);
+    run.line = line++;
+    RunStatistics statistics;
+    statistics.channels.resize(5, {.lowest_V = 0.3, .highest_V = 2});
+    statistics.channels[1].lowest_V = lowest_V;
+    statistics.channels[1].highest_V = highest_V;
+    statistics.channels[4].highest_V = 1e4;  // no rotor's: anything may be recorded there
+    doubt.look_at(run, {type, 5}, statistics);
+  }
+  return doubt.doubts();
+}
+
+TEST(ImportDoubts, VoltsBeyondTheConverterAreNoVolts) {
+  EXPECT_THAT(volt_doubts({{0.3, 3.3}, {-3.3, 2}, {0, 3.301}}), IsEmpty());
+  EXPECT_THAT(
+      volt_doubts({{0.3, 2}, {300, 2734}, {300, 2500}}),
+      ElementsAre("runs.csv:3: run R3: channel 2 of raw/R3.npy holds 2734 V, beyond the converter's "
+                  "reference of 3.3 V (daq.adc_reference_V): are these volts (not counts or mV)? It is "
+                  "so in 2 runs"));
+  EXPECT_THAT(volt_doubts({{-2048, 2047}}), ElementsAre(HasSubstr("holds -2048 V")));
+  EXPECT_THAT(volt_doubts({{300, 2734}}, SampleType::kInt16), IsEmpty()) << "counts are another rule's";
 }
 
 TEST(ImportDoubts, ALocationStandsAtOnePlace) {
