@@ -2,6 +2,7 @@
 #include "calibration/crosstalk.h"
 #include "cli/console.h"
 #include "cli/verb.h"
+#include "datasets/calibration_doubts.h"
 #include "datasets/campaign_file.h"
 #include "datasets/error.h"
 
@@ -45,7 +46,9 @@ int calibrate_campaign(const CalibrateOptions& options) {
   const auto tests = new_tests ? parse_propellers(*new_tests, info.rig.rotors) : file.propeller_tests();
   if (points.empty())
     throw InputError::in(options.db, "holds no calibration points; --points calibration.csv adds them");
-  const Certificate certificate = calibrate(points, tests, how);
+  Certificate certificate = calibrate(points, tests, how);
+  for (std::string& doubt : calibration_doubts(file, points))
+    certificate.warnings.push_back(std::move(doubt));
   const nlohmann::json inputs{{"points", certificate.points_hash}};
   std::int64_t id = 0;
   file.atomically([&] {  // only what is to be written: a recorder may be waiting

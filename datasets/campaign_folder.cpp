@@ -1,5 +1,6 @@
 #include "datasets/campaign_folder.h"
 
+#include "datasets/calibration_doubts.h"
 #include "datasets/error.h"
 #include "datasets/import_doubts.h"
 #include "datasets/npy.h"
@@ -326,6 +327,8 @@ ImportSummary import_campaign_folder(const fs::path& folder, const fs::path& fil
     if (options.progress) options.progress(++done, text.parsed_runs.size());
   }
   raw.finish();
+  for (std::string& doubt : calibration_doubts(campaign, campaign.calibration_points()))
+    summary.doubts.push_back(std::move(doubt));
   staged.publish();
   return summary;
 }

@@ -74,8 +74,12 @@ TEST_F(MeasuredData, FarekeCellsAreCalibratedAndTheGrossRowIsNamed) {
 
 TEST_F(MeasuredData, ExampleCampaignOfSomebodyElse) {
   SKIP_WITHOUT_SHARED_DATA();
-  ASSERT_EQ(run("import " + data("example_campaign") + " --db e.db").code, 0);
-  EXPECT_NE(run("calibrate --db e.db").code, 2);
+  const ProgramResult imported = run("import " + data("example_campaign") + " --db e.db");
+  ASSERT_EQ(imported.code, 0);
+  EXPECT_EQ(imported.error, "");
+  const ProgramResult calibrated = run("calibrate --db e.db");
+  EXPECT_NE(calibrated.code, 2);
+  EXPECT_THAT(calibrated.out, testing::Not(HasSubstr("calibration.csv:")));
   ASSERT_EQ(run("reduce --db e.db --csv e.csv").code, 0);
   EXPECT_EQ(read_csv(folder / "e.csv").rows.size(), 15u);
   EXPECT_EQ(run("map --db e.db --out maps").code, 0);
