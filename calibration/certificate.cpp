@@ -1,6 +1,7 @@
 #include "calibration/certificate.h"
 
 #include "datasets/error.h"
+#include "datasets/first_few.h"
 
 #include <algorithm>
 #include <cmath>
@@ -133,6 +134,35 @@ void warn_of_propellers(const PropellerFactors& propellers, std::vector<std::str
   }
 }
 
+double median_without(const std::vector<PropellerTest>& tests, std::size_t left_out) {
+  std::vector<double> thrusts_N;
+  for (std::size_t i = 0; i < tests.size(); ++i)
+    if (i != left_out) thrusts_N.push_back(tests[i].thrust_N);
+  std::sort(thrusts_N.begin(), thrusts_N.end());
+  const std::size_t middle = thrusts_N.size() / 2;
+  return thrusts_N.size() % 2 == 1 ? thrusts_N[middle] : (thrusts_N[middle - 1] + thrusts_N[middle]) / 2;
+}
+
+/// One motor turns propellers of one size in all tests: their thrusts are within some per cent.
+void warn_of_odd_tests(const std::vector<PropellerTest>& tests, std::vector<std::string>& warnings) {
+  constexpr double kOdd = 2;
+  constexpr std::size_t kNamed = 3;
+  std::vector<std::string> odd;
+  for (std::size_t i = 0; tests.size() > 1 && i < tests.size(); ++i) {
+    const double median_N = median_without(tests, i), ratio = tests[i].thrust_N / median_N;
+    if (ratio <= kOdd && ratio >= 1 / kOdd) continue;
+    odd.push_back(
+        fmt::format("line {} (propeller {} on rotor {}) has {:g} N where the median of the others is "
+                    "{:.4g} N",
+                    tests[i].line, tests[i].propeller, tests[i].rotor, tests[i].thrust_N, median_N));
+  }
+  if (odd.empty()) return;
+  warnings.push_back(
+      fmt::format("propeller tests: {}; are these newtons (not grams)? Every propeller factor "
+                  "depends on all tests",
+                  first_few(odd, kNamed)));
+}
+
 CalibrationConditions conditions_of(const std::vector<CalibrationPoint>& points,
                                     const std::vector<PropellerTest>& tests) {
   CalibrationConditions conditions{.points = static_cast<int>(points.size()),
@@ -186,6 +216,7 @@ Certificate calibrate(const std::vector<CalibrationPoint>& points, const std::ve
   warn_of_zeros(certificate.cells, certificate.warnings);
   certificate.propellers = propeller_factors(tests, options.rotors);
   warn_of_propellers(certificate.propellers, certificate.warnings);
+  warn_of_odd_tests(tests, certificate.warnings);
   return certificate;
 }
 

@@ -116,6 +116,30 @@ TEST(Certificate, AGrossPointIsInTheWarningsAndInTheTable) {
   EXPECT_TRUE(certificate.passed());
 }
 
+TEST(Certificate, APropellerTestInGramsIsNamed) {
+  const auto points = four_cells(4);
+  const auto odd = [&](std::vector<PropellerTest> tests) {
+    std::string found;
+    for (const std::string& warning : calibrate(points, tests).warnings)
+      if (warning.starts_with("propeller tests: ")) found += warning;
+    return found;
+  };
+  std::vector<PropellerTest> tests = four_propellers();
+  EXPECT_EQ(odd(tests), "");
+  tests[2].thrust_N *= 1.9;
+  EXPECT_EQ(odd(tests), "") << "no other unit is so near";
+  tests = four_propellers();
+  tests[5].thrust_N = 769;
+  EXPECT_THAT(odd(tests),
+              HasSubstr("line 7 (propeller C on rotor 3) has 769 N where the median of the others is "
+                        "7.5 N; are these newtons (not grams)?"));
+  tests[5].thrust_N = 0.769;  // kilograms
+  EXPECT_THAT(odd(tests), HasSubstr("line 7 (propeller C on rotor 3) has 0.769 N"));
+  for (PropellerTest& test : tests)
+    test.thrust_N = test.rotor > 2 ? 769 : 7.5;  // half of them: none can be told right
+  EXPECT_THAT(odd(tests), HasSubstr("and 5 more"));
+}
+
 TEST(Certificate, ForceAndItsSensitivitiesAgreeWithDifferences) {
   Certificate certificate = calibrate(four_cells(5), {});
   const double voltage = 2.1, step = 1e-6;
