@@ -1,5 +1,6 @@
 #include "analysis/health.h"
 
+#include "analysis/implausible_thrust.h"
 #include "analysis/reduction.h"
 #include "datasets/error.h"
 #include "datasets/first_few.h"
@@ -307,6 +308,10 @@ class Examination {
            "let motors and cells warm up before a run");
   }
 
+  void thrusts() {
+    if (const auto doubt = implausible_thrust(data_)) problem("thrusts", doubt->found, doubt->advice);
+  }
+
   void rates() {
     Names wrong;
     for (const auto& [name, run] : data_.raw) {
@@ -381,6 +386,7 @@ std::vector<Finding> examine(const CampaignFile& file, const CampaignData& data,
   examination.metadata();
   examination.speeds();
   examination.drifts();
+  examination.thrusts();
   examination.rates();
   return examination.take();
 }

@@ -1,3 +1,4 @@
+#include "analysis/implausible_thrust.h"
 #include "analysis/model/model_store.h"
 #include "analysis/reduction_output.h"
 #include "analysis/table_reduction.h"
@@ -10,6 +11,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -75,7 +77,12 @@ void print_summary(const CampaignData& data, const Reduction& reduction, const S
   for (const std::string& note : summary.notes) fmt::print("note: {}\n", note);
 }
 
-/// Says what was left out. True where that needs mending.
+bool warn_of(const std::optional<ImplausibleThrust>& doubt) {
+  if (doubt) warn(fmt::format("{}: {}", doubt->found, doubt->advice));
+  return doubt.has_value();
+}
+
+/// Says what was left out, and what cannot be. True where that needs mending.
 bool warn_of_left_out(const CampaignData& data, const Reduction& reduction) {
   bool problem = false;
   for (const LeftOutRun& run : reduction.left_out) {
@@ -96,6 +103,7 @@ bool warn_of_left_out(const CampaignData& data, const Reduction& reduction) {
     warn(fmt::format("{} runs have no tare in their session; their zero is the calibration's, extrapolated",
                      untared));
   }
+  problem |= warn_of(implausible_thrust(data, reduction));
   return problem;
 }
 
@@ -166,7 +174,8 @@ int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
     warn(fmt::format("{} rows are left out: their speed, air or propeller diameter is not known",
                      reduction.unknown));
   }
-  return reduction.unknown > 0 ? kProblemFound : kWell;
+  const bool implausible = warn_of(implausible_thrust(reduction));
+  return reduction.unknown > 0 || implausible ? kProblemFound : kWell;
 }
 
 int run_reduce(const ReduceOptions& options) {

@@ -1,0 +1,94 @@
+// A unit mistake is said by every verb that can see it, from the import on.
+#include "cli/program.h"
+#include "datasets/csv.h"
+#include "support/example_campaign.h"
+#include "support/temporary_folder.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+using test::ProgramResult;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+struct UnitMistakes : testing::Test {
+  test::TemporaryFolder folder;
+
+  ProgramResult run(const std::string& arguments) const {
+    return test::run_program(folder.path(), arguments);
+  }
+
+  /// The example, its calibration's forces times `factor`.
+  ProgramResult import_with_forces_times(double factor) const {
+    test::ExampleCampaign campaign;
+    const Sheet sheet = parse_csv(campaign.calibration_csv, "calibration.csv");
+    campaign.calibration_csv = "cell,applied_force_N,voltage_V\n";
+    for (std::size_t row = 0; row < sheet.rows.size(); ++row)
+      campaign.calibration_csv +=
+          fmt::format("{},{},{}\n", sheet.text(row, "cell"),
+                      factor * sheet.require_number(row, "applied_force_N"), sheet.text(row, "voltage_V"));
+    campaign.write(folder / "source");
+    return run("import source --db c.db");
+  }
+};
+
+TEST_F(UnitMistakes, ASoundCampaignIsNotDoubted) {
+  const ProgramResult imported = import_with_forces_times(1);
+  EXPECT_EQ(imported.code, 0);
+  EXPECT_EQ(imported.error, "");
+  EXPECT_THAT(run("calibrate --db c.db").out, Not(HasSubstr("(not ")));
+  const ProgramResult reduced = run("reduce --db c.db");
+  EXPECT_EQ(reduced.code, 0) << reduced.error;
+  EXPECT_THAT(reduced.error, Not(HasSubstr("a rotor of")));
+  EXPECT_THAT(run("doctor --db c.db").out, Not(HasSubstr("thrusts")));
+}
+
+TEST_F(UnitMistakes, ACalibrationInGrams) {
+  const ProgramResult imported = import_with_forces_times(1000 / 9.80665);
+  EXPECT_EQ(imported.code, 0);
+  EXPECT_THAT(imported.error, HasSubstr("are these newtons (not grams)?"));
+  EXPECT_THAT(run("calibrate --db c.db").out, AllOf(HasSubstr("Warnings"), HasSubstr("(not grams)?")));
+  const ProgramResult reduced = run("reduce --db c.db");
+  EXPECT_EQ(reduced.code, 1);
+  EXPECT_THAT(reduced.error, HasSubstr("gives 83.6 N at most at 5000 rev/min (so at 3 of 3 locations)"));
+  const ProgramResult doctor = run("doctor --db c.db");
+  EXPECT_EQ(doctor.code, 1);
+  EXPECT_THAT(doctor.out, HasSubstr("problem  thrusts"));
+}
+
+/// What the points do not show, the thrusts do.
+TEST_F(UnitMistakes, ACalibrationInKilograms) {
+  EXPECT_EQ(import_with_forces_times(1 / 9.80665).error, "");
+  EXPECT_EQ(run("calibrate --db c.db").code, 0);
+  const ProgramResult reduced = run("reduce --db c.db");
+  EXPECT_EQ(reduced.code, 1);
+  EXPECT_THAT(reduced.error, HasSubstr("no rotor gives more anywhere"));
+}
+
+TEST_F(UnitMistakes, ATableWhoseDiameterIsInAnotherUnit) {
+  write_text(folder / "t.csv", "N,T\n5000,2.9\n6000,4.2\n7000,5.7\n");
+  const auto reduce_with = [&](const char* diameter_m) {
+    write_text(folder / "t.toml",
+               fmt::format("format = \"tunnelrig-table/1\"\nname = \"t\"\nblocks = \"rows\"\n"
+                           "[response]\ncolumn = \"T\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+                           "[speed]\ncolumn = \"N\"\nunit = \"rev/min\"\n[propeller]\ndiameter_m = {}\n"
+                           "[air]\ntemperature_C = 20\npressure_Pa = 101325\n",
+                           diameter_m));
+    const ProgramResult imported = run("import t.csv --format table --schema t.toml --db t.db --replace");
+    EXPECT_EQ(imported.code, 0) << imported.error;
+    return run("reduce --db t.db");
+  };
+  const ProgramResult sound = reduce_with("0.2286");
+  EXPECT_EQ(sound.code, 0) << sound.error;
+  const ProgramResult inches = reduce_with("9");
+  EXPECT_EQ(inches.code, 1);
+  EXPECT_THAT(inches.error, HasSubstr("is less than any propeller's"));
+}
+
+}  // namespace
+}  // namespace tunnelrig
