@@ -1,6 +1,6 @@
 #include "analysis/location_summary.h"
 
-#include "analysis/conventions.h"
+#include "analysis/shared_sources.h"
 #include "analysis/variance_components.h"
 #include "calibration/distributions.h"
 #include "datasets/error.h"
@@ -17,17 +17,6 @@ namespace {
 struct Grouping {
   std::vector<LocationSummary> locations;
   std::vector<std::size_t> location_of, session_of;  // by index in Reduction::runs
-};
-
-/// An error that several locations share: parameters with a covariance, and how each location depends on
-/// them.
-struct SharedSource {
-  double Budget::*share;
-  Eigen::MatrixXd covariance;  // of the parameters
-  double dof;
-  Eigen::MatrixXd c_t, u;  // locations × parameters
-
-  bool has_dof() const { return std::isfinite(dof) && dof > 0; }
 };
 
 /// The place of a location in the order of the tables: columns from the centre, top to bottom, then open
@@ -115,152 +104,6 @@ Scatter scatter_of(const Grouping& grouping, std::vector<double> values, bool re
     scatter.means.covariance.col(row) *= scale[l];
   }
   return scatter;
-}
-
-/// Averages, over the runs of each location, of how C_T and U depend on `parameters` values; `slopes` gives
-/// them run by run.
-template <typename Slopes>
-SharedSource shared_source(double Budget::*share, const Grouping& grouping, const Reduction& reduction,
-                           const Rig& rig, const Eigen::MatrixXd& covariance, double dof,
-                           const Slopes& slopes) {
-  const auto locations = static_cast<Eigen::Index>(grouping.locations.size());
-  SharedSource source{share, covariance, dof, Eigen::MatrixXd::Zero(locations, covariance.rows()),
-                      Eigen::MatrixXd::Zero(locations, covariance.rows())};
-  std::vector<double> count(grouping.locations.size());
-  for (std::size_t i = 0; i < reduction.runs.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(grouping.location_of[i]);
-    const auto c_t = c_t_per_thrust(reduction.runs[i], rig);
-    const auto u = u_per_thrust(reduction.runs[i]);
-    // thrust slopes: rotors × parameters
-    const Eigen::MatrixXd thrust = slopes(reduction.runs[i]);
-    for (Eigen::Index rotor = 0; rotor < thrust.rows(); ++rotor) {
-      source.c_t.row(row) += c_t[static_cast<std::size_t>(rotor)] * thrust.row(rotor);
-      source.u.row(row) += u[static_cast<std::size_t>(rotor)] * thrust.row(rotor);
-    }
-    count[grouping.location_of[i]] += 1;
-  }
-  for (Eigen::Index l = 0; l < locations; ++l) {
-    source.c_t.row(l) /= count[static_cast<std::size_t>(l)];
-    source.u.row(l) /= count[static_cast<std::size_t>(l)];
-  }
-  return source;
-}
-
-/// One source per cell: their calibrations are independent, each with its own degrees of freedom.
-void add_calibration(const CampaignData& data, const Grouping& grouping, const Reduction& reduction,
-                     std::vector<SharedSource>& sources) {
-  for (int rotor = 0; data.certificate && rotor < data.info.rig.rotors; ++rotor) {
-    const CellFit& cell = data.certificate->cells[static_cast<std::size_t>(rotor)];
-    sources.push_back(shared_source(&Budget::calibration, grouping, reduction, data.info.rig, cell.covariance,
-                                    cell.dof, [&](const RunCoefficients& run) {
-                                      Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(data.info.rig.rotors, 2);
-                                      slope(rotor, 0) = run.d_zero_N_per_V[static_cast<std::size_t>(rotor)];
-                                      slope(rotor, 1) = run.d_gain_N2_per_V[static_cast<std::size_t>(rotor)];
-                                      return slope;
-                                    }));
-  }
-}
-
-void add_propellers(const CampaignData& data, const Grouping& grouping, const Reduction& reduction,
-                    std::vector<SharedSource>& sources) {
-  if (!data.certificate || !data.certificate->propellers.tested || data.certificate->propellers.dof == 0)
-    return;
-  const PropellerFactors& propellers = data.certificate->propellers;
-  sources.push_back(shared_source(&Budget::propellers, grouping, reduction, data.info.rig,
-                                  propellers.covariance, propellers.dof, [&](const RunCoefficients& run) {
-                                    Eigen::MatrixXd slope =
-                                        Eigen::MatrixXd::Zero(data.info.rig.rotors, data.info.rig.rotors);
-                                    for (Eigen::Index i = 0; run.from_volts && i < slope.rows(); ++i) {
-                                      slope(i, i) =
-                                          -run.thrust_N[static_cast<std::size_t>(i)] / propellers.factor(i);
-                                    }
-                                    return slope;
-                                  }));
-}
-
-/// One source per channel, whose parameters are the tares. How the zero wanders between them is the runs' own
-/// and in their scatter.
-void add_tares(const CampaignData& data, const Grouping& grouping, const Reduction& reduction,
-               std::vector<SharedSource>& sources) {
-  const auto& tares = reduction.tares.readings();
-  if (tares.empty()) return;
-  for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
-    const auto channel = static_cast<std::size_t>(rotor);
-    Eigen::VectorXd variance(static_cast<Eigen::Index>(tares.size()));
-    for (std::size_t t = 0; t < tares.size(); ++t) {
-      variance(static_cast<Eigen::Index>(t)) =
-          tares[t].standard_error_V[channel] * tares[t].standard_error_V[channel];
-    }
-    sources.push_back(shared_source(&Budget::tare, grouping, reduction, data.info.rig, variance.asDiagonal(),
-                                    50, [&](const RunCoefficients& run) {
-                                      Eigen::MatrixXd slope =
-                                          Eigen::MatrixXd::Zero(data.info.rig.rotors, variance.size());
-                                      if (!run.tare) return slope;
-                                      for (const TareZero::Weight& weight : run.tare->weights) {
-                                        slope(rotor, static_cast<Eigen::Index>(weight.tare)) =
-                                            run.d_tare_N_per_V[channel] * weight.weight;
-                                      }
-                                      return slope;
-                                    }));
-  }
-}
-
-/// The adopted effects' parameters, to first order.
-void add_model(const CampaignData& data, const Grouping& grouping, const Reduction& reduction,
-               std::vector<SharedSource>& sources) {
-  const AppliedModel& model = reduction.model;
-  if (model.covariance.size() == 0) return;
-  sources.push_back(shared_source(
-      &Budget::model, grouping, reduction, data.info.rig, model.covariance, model.dof,
-      [&](const RunCoefficients& run) {
-        Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(data.info.rig.rotors, model.covariance.rows());
-        for (Eigen::Index rotor = 0; rotor < slope.rows(); ++rotor)
-          for (Eigen::Index k = 0; k < slope.cols(); ++k)
-            slope(rotor, k) = run.d_parameter_N[static_cast<std::size_t>(k)][static_cast<std::size_t>(rotor)];
-        return slope;
-      }));
-}
-
-/// An instrument's own error is the same in every run, so that repeats do not show it: C_T changes by
-/// `relative` of itself, U not.
-void add_instrument(double Budget::*share, double relative, const Grouping& grouping,
-                    const std::vector<double>& c_t, std::vector<SharedSource>& sources) {
-  const auto locations = static_cast<Eigen::Index>(grouping.locations.size());
-  SharedSource source{share, Eigen::MatrixXd::Identity(1, 1), std::numeric_limits<double>::infinity(),
-                      Eigen::MatrixXd::Zero(locations, 1), Eigen::MatrixXd::Zero(locations, 1)};
-  for (Eigen::Index l = 0; l < locations; ++l) source.c_t(l, 0) = relative * c_t[static_cast<std::size_t>(l)];
-  sources.push_back(std::move(source));
-}
-
-void add_instruments(const CampaignData& data, const Grouping& grouping, const Reduction& reduction,
-                     const std::vector<double>& c_t, std::vector<SharedSource>& sources,
-                     std::vector<std::string>& notes) {
-  const InstrumentUncertainty& declared = data.info.uncertainty;
-  double mean_temperature_K = 0;
-  for (const RunCoefficients& run : reduction.runs)
-    mean_temperature_K += run.temperature_K / static_cast<double>(reduction.runs.size());
-  const auto left_out = [&notes](const char* quantity, const char* key) {
-    notes.push_back(
-        fmt::format("{}: the instrument's own error is left out (campaign.toml declares no uncertainty.{}); "
-                    "what changes from run to run is in the scatter",
-                    quantity, key));
-  };
-  if (declared.speed_rpm)
-    add_instrument(&Budget::speed, 2 * *declared.speed_rpm / data.info.rig.nominal_speed_rpm, grouping, c_t,
-                   sources);
-  else
-    left_out("speed", "speed_rpm");
-  if (declared.air_temperature_K)
-    add_instrument(&Budget::temperature, *declared.air_temperature_K / mean_temperature_K, grouping, c_t,
-                   sources);
-  else
-    left_out("temperature", "air_temperature_K");
-  const double exponent = reduction.terms.air_pressure ? 1 : reduction.model.pressure_exponent;
-  if (exponent == 0) return;
-  if (declared.air_pressure_Pa)
-    add_instrument(&Budget::pressure, exponent * *declared.air_pressure_Pa / 101325, grouping, c_t, sources);
-  else
-    left_out("pressure", "air_pressure_Pa");
 }
 
 void note_components(const VarianceComponents& components, const Reduction& reduction,
@@ -366,12 +209,8 @@ Summary summarize_locations(const CampaignData& data, const Reduction& reduction
   const Scatter u_scatter = has_u ? scatter_of(grouping, u, false) : Scatter{};
   note_components(c_t_scatter.components, reduction, summary.notes);
 
-  std::vector<SharedSource> sources;
-  add_calibration(data, grouping, reduction, sources);
-  add_propellers(data, grouping, reduction, sources);
-  add_tares(data, grouping, reduction, sources);
-  add_model(data, grouping, reduction, sources);
-  add_instruments(data, grouping, reduction, c_t_scatter.means.mean, sources, summary.notes);
+  const std::vector<SharedSource> sources =
+      shared_sources(data, reduction, grouping.location_of, c_t_scatter.means.mean, summary.notes);
 
   summary.locations = grouping.locations;
   std::vector<double> noise_c_t(summary.locations.size()), noise_u(summary.locations.size());

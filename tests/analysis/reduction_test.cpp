@@ -200,6 +200,9 @@ TEST(Locations, ThrustsOfTheSheetHaveNoPropellersUncertainty) {
   const LocationSummary location = summarize_locations(data, reduce_runs(data, {})).locations[0];
   EXPECT_EQ(location.budget.propellers, 0);
   EXPECT_DOUBLE_EQ(location.u_percent.u95, alone);
+  EXPECT_THAT(
+      testing::PrintToString(summarize_locations(data, reduce_runs(data, {})).notes),
+      HasSubstr("thrusts: those of 2 of 2 runs stand in runs.csv (thrust_i_N), and what their calibration"));
 }
 
 /// An anchor once a session, every other place once: what runs and sessions scatter is known together.

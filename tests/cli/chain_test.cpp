@@ -210,6 +210,8 @@ TEST_F(Chain, JsonForMachines) {
   }
   const auto reduction = nlohmann::json::parse(run("reduce --db c.db --json").out);
   EXPECT_EQ(reduction["locations"].size(), 42u);
+  EXPECT_THAT(reduction["notes"].dump(), testing::Not(HasSubstr("stand in runs.csv")))
+      << "thrusts that the certificate made have its uncertainty";
   const double thesis = reduction["locations"][0]["c_t"]["mean"];
   const double propeller = nlohmann::json::parse(
       run("reduce --db c.db --json --convention propeller").out)["locations"][0]["c_t"]["mean"];
