@@ -4,6 +4,7 @@
 #include "cli/verb.h"
 #include "datasets/csv.h"
 #include "datasets/error.h"
+#include "datasets/output_place.h"
 #include "flight/tuning/tuner.h"
 
 #include <cmath>
@@ -167,6 +168,7 @@ int run_fly(const FlyOptions& given) {
   const bool programme = options.scenario == "all";
   const std::vector<PlaceAndPath> wanted = programme_of(options);
   check_all(options, wanted, gains);
+  const FoldersForOutput made(options.out);
   if (!options.out.empty()) make_folder(options.out);
   std::vector<FlownScenario> flown;
   fmt::print("SIMULATED flights; map: {}\n\n", map.name);

@@ -3,6 +3,7 @@
 #include "cli/console.h"
 #include "cli/fly_pictures.h"
 #include "datasets/csv.h"
+#include "datasets/output_place.h"
 
 #include <cmath>
 #include <iterator>
@@ -210,6 +211,7 @@ void print_beside_thesis(const std::vector<FlownScenario>& flown) {
 std::vector<std::filesystem::path> write_flown(const std::filesystem::path& folder,
                                                const FlownScenario& flown, const FlightTask& task,
                                                std::string& warning) {
+  const FoldersForOutput made(folder);
   make_folder(folder);
   std::vector<std::filesystem::path> files;
   const auto write = [&](const std::string& name, const std::string& text) {

@@ -2,6 +2,7 @@
 
 #include "analysis/maps/category_colours.h"
 #include "analysis/maps/gnuplot.h"
+#include "analysis/maps/staging.h"
 
 #include <algorithm>
 #include <cmath>
@@ -80,10 +81,8 @@ std::string error_plot(const FlownScenario& flown, std::size_t shown, const char
 std::vector<std::filesystem::path> draw_flown(const std::filesystem::path& folder, const FlownScenario& flown,
                                               const FlightTask& task, std::string& warning) {
   const std::size_t shown = std::min(flown.logs.size(), kMost);
-  const auto scratch = folder / ".gnuplot";
-  std::filesystem::create_directories(scratch);
   std::string script = data_blocks(flown, task, shown);
-  std::vector<std::filesystem::path> files;
+  std::vector<std::string> names;
   const std::string title =
       "set title " +
       gnuplot_text(
@@ -93,25 +92,23 @@ std::vector<std::filesystem::path> draw_flown(const std::filesystem::path& folde
   const auto add = [&](const char* name, const std::string& plot, int width, int height) {
     for (const char* format : {"svg", "png"}) {
       const bool png = std::string_view(format) == "png";
+      names.push_back(fmt::format("{}.{}", name, format));
       script += fmt::format(
           "set terminal {} size {},{}{} font 'DejaVu Sans,{}'\nset output '{}'\n{}{}unset output\n",
           png ? "pngcairo" : "svg", width, height, png ? "" : " background '#ffffff'", png ? 12 : 13,
-          fmt::format("{}.{}", name, format), title, plot);
-      files.push_back(folder / fmt::format("{}.{}", name, format));
+          names.back(), title, plot);
     }
   };
   script = "set encoding utf8\nset grid lc rgb '#dddddd'\n" + script;
   add("path", path_plot(flown, task, shown), 1000, 820);
   add("error-y", error_plot(flown, shown, "y", 4), 1100, 520);
   add("error-z", error_plot(flown, shown, "z", 5), 1100, 520);
-  const auto failed = run_gnuplot("gnuplot", scratch, script);
-  if (failed) {
-    warning = *failed + "; no pictures";
-    files.clear();
-  }
-  for (const auto& file : files) std::filesystem::rename(scratch / file.filename(), file);
-  std::filesystem::remove_all(scratch);
-  return files;
+  const Staging staging(folder, "pictures");
+  std::optional<std::string> failed;
+  staging.write([&] { failed = run_gnuplot("gnuplot", staging.path(), script); });
+  if (!failed) return staging.publish(names);
+  warning = *failed + "; no pictures";
+  return {};
 }
 
 }  // namespace tunnelrig::cli

@@ -160,7 +160,8 @@ CampaignFile::CampaignFile(const std::filesystem::path& path, Access access) : p
                   : std::make_unique<Database>(path.string(), flags);
   try {
     check_kind_of_file(*database_, path.string());
-  } catch (const StorageError&) {
+  } catch (const StorageError& failure) {
+    if (failure.disk_full()) throw InputError(failure.what());  // SQLite needs 32 kB beside it, even to read
     throw InputError::in(path.string(), "is no campaign file, or is damaged");
   }
   if (access == Access::kRead) {
@@ -321,8 +322,14 @@ StagedCampaign::StagedCampaign(const std::filesystem::path& target, bool replace
     }
   }
   remove_leftovers(target);
-  file_ = std::unique_ptr<CampaignFile>(new CampaignFile(staged_, CampaignFile::Unsafe{}));
-  file_->database_->execute("BEGIN");
+  try {
+    file_ = std::unique_ptr<CampaignFile>(new CampaignFile(staged_, CampaignFile::Unsafe{}));
+    file_->database_->execute("BEGIN");
+  } catch (const StorageError&) {
+    file_.reset();
+    std::filesystem::remove(staged_, error);
+    throw;
+  }
 }
 
 StagedCampaign::~StagedCampaign() {

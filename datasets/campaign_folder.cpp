@@ -267,8 +267,7 @@ void export_raw_run(const CampaignFile& file, const RawRun& raw, const fs::path&
   fs::create_directories(path.parent_path());
   NpySink sink(path, raw);
   read_raw(file, raw, sink);
-  if (!sink.close())
-    throw StorageError(fmt::format("{}: cannot be written; is the disk full?", path.string()), true);
+  if (!sink.close()) throw InputError::in(path.string(), "cannot be written; is the disk full?");
   if (!sink.gaps().empty()) write_text(gaps_path(path), format_csv(gap_sheet(sink.gaps())));
 }
 
@@ -335,7 +334,7 @@ ImportSummary import_campaign_folder(const fs::path& folder, const fs::path& fil
 
 void export_campaign_folder(const CampaignFile& file, const fs::path& folder, const Progress& progress) {
   StagedOutput staged(folder, StagedOutput::Kind::kFolder);
-  write_folder(file, staged.path(), progress);
+  staged.write([&] { write_folder(file, staged.path(), progress); });
   staged.publish();
 }
 

@@ -37,6 +37,7 @@ ImportSummary import_campaign_folder(const std::filesystem::path& folder, const 
 
 /// Writes the campaign as a folder that must not exist, or be empty. Import of it gives the same campaign:
 /// text cell by cell, array types, values and gaps. The folder appears whole or not at all.
+/// Throws InputError naming what cannot be written, StorageError where raw data are damaged.
 void export_campaign_folder(const CampaignFile& file, const std::filesystem::path& folder,
                             const Progress& progress);
 

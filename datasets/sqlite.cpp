@@ -14,8 +14,11 @@ constexpr int kPatience_ms = 5000;  // with other connections that write
 [[noreturn]] void fail(sqlite3* handle, int code) {
   const int extended = handle != nullptr ? sqlite3_extended_errcode(handle) : code;
   const char* file = handle != nullptr ? sqlite3_db_filename(handle, "main") : nullptr;
-  const std::string reason = handle != nullptr ? sqlite3_errmsg(handle) : sqlite3_errstr(code);
-  const bool disk_full = (extended & 0xFF) == SQLITE_FULL || extended == SQLITE_IOERR_WRITE;
+  std::string reason = handle != nullptr ? sqlite3_errmsg(handle) : sqlite3_errstr(code);
+  // Beside a full disk, a file at the limit of its size (ulimit -f), also that which connections share.
+  const bool cannot_grow = extended == SQLITE_IOERR_WRITE || extended == SQLITE_IOERR_SHMSIZE;
+  if (cannot_grow) reason += ": is the disk full, or a file at its limit?";
+  const bool disk_full = (extended & 0xFF) == SQLITE_FULL || cannot_grow;
   throw StorageError(fmt::format("{}: {}", file != nullptr && *file != '\0' ? file : "data base", reason),
                      disk_full);
 }

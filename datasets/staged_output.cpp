@@ -27,7 +27,8 @@ fs::path without_slash(const fs::path& target) {
 
 }  // namespace
 
-StagedOutput::StagedOutput(const fs::path& target, Kind kind) : target_(without_slash(target)), kind_(kind) {
+StagedOutput::StagedOutput(const fs::path& target, Kind kind)
+    : target_(without_slash(target)), above_(target_.parent_path()), kind_(kind) {
   if (target_.empty()) throw InputError("the name of what is to be written is empty");
   std::error_code error;
   const bool taken = fs::exists(fs::symlink_status(target_, error));

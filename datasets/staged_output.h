@@ -1,7 +1,10 @@
 // What the user asked to have written appears whole or not at all.
 #pragma once
 
+#include "datasets/output_place.h"
+
 #include <filesystem>
+#include <functional>
 
 namespace tunnelrig {
 
@@ -21,11 +24,15 @@ class StagedOutput {
 
   const std::filesystem::path& path() const { return staged_; }
 
+  /// Calls `write`, which writes to `path()`; where it fails its message names the target (output_place.h).
+  void write(const std::function<void()>& write) const { write_as(target_, staged_, write); }
+
   /// Throws InputError where something has come to stand in the target's place meanwhile.
   void publish();
 
  private:
   std::filesystem::path target_, staged_;
+  FoldersForOutput above_;  // the target
   Kind kind_;
 };
 

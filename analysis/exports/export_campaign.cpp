@@ -153,6 +153,14 @@ Plan plan_of(const CampaignFile& file, const Settings& settings) {
   return plan;
 }
 
+void write(const CampaignFile& file, const Plan& plan, Writer& writer, const Progress& progress) {
+  stream_recordings(file, plan.sources, writer, progress);
+  for (const Table& table : plan.contents.tables) writer.table(table);
+  for (const ArrayGroup& group : plan.contents.groups) writer.group(group);
+  writer.texts(plan.contents.texts);
+  writer.finish(plan.contents.provenance);
+}
+
 }  // namespace
 
 Format format_from_name(std::string_view name) {
@@ -185,18 +193,13 @@ Exported export_campaign(const CampaignFile& file, const std::filesystem::path& 
   const auto kind = is_folder(settings.format) ? StagedOutput::Kind::kFolder : StagedOutput::Kind::kFile;
   StagedOutput staged(target, kind);
   const Plan plan = plan_of(file, settings);
-  const std::unique_ptr<Writer> writer = make_writer(settings.format, staged.path());
   Exported exported{.absent = plan.contents.absent};
-  stream_recordings(file, plan.sources, *writer, progress);
   exported.recordings = plan.sources.size();
   for (const RecordingSource& source : plan.sources) {
     exported.frames += source.raw.frames;
     exported.sample_bytes += source.raw.frames * source.raw.format.frame_size();
   }
-  for (const Table& table : plan.contents.tables) writer->table(table);
-  for (const ArrayGroup& group : plan.contents.groups) writer->group(group);
-  writer->texts(plan.contents.texts);
-  writer->finish(plan.contents.provenance);
+  staged.write([&] { write(file, plan, *make_writer(settings.format, staged.path()), progress); });
   staged.publish();
   return exported;
 }

@@ -52,7 +52,8 @@ using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Writes `target`, which must not exist (csv, npy: or be an empty folder): whole, or not at all. Recordings
 /// are streamed in blocks. What the campaign does not give is left out and named in the result. Throws
-/// InputError where the target cannot be taken, StorageError where the disk is full or raw data are damaged.
+/// InputError where the target cannot be taken or written (a full disk), StorageError where raw data are
+/// damaged.
 Exported export_campaign(const CampaignFile& file, const std::filesystem::path& target,
                          const Settings& settings, const Progress& progress = {});
 

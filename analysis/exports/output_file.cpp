@@ -18,8 +18,7 @@ constexpr std::size_t kBuffer = 1 << 16;
 
 void fail_to_write(const std::string& name) {
   const int why = errno;
-  throw StorageError(fmt::format("{}: cannot be written: {}", name, std::generic_category().message(why)),
-                     why == ENOSPC);
+  throw InputError::in(name, "cannot be written: {}", std::generic_category().message(why));
 }
 
 OutputFile::OutputFile(const std::filesystem::path& path) : name_(path.string()) {

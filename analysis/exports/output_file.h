@@ -10,7 +10,7 @@
 
 namespace tunnelrig::exports {
 
-/// All methods throw StorageError naming the file where the disk is full or fails.
+/// All methods throw InputError naming the file where the disk is full or fails.
 class OutputFile {
  public:
   explicit OutputFile(const std::filesystem::path& path);
@@ -36,7 +36,7 @@ class OutputFile {
 /// A whole file.
 void write_file(const std::filesystem::path& path, std::string_view text);
 
-/// Throws a StorageError that says what errno does.
+/// Throws an InputError that says what errno does.
 [[noreturn]] void fail_to_write(const std::string& name);
 
 }  // namespace tunnelrig::exports

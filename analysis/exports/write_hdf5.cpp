@@ -148,7 +148,7 @@ class Hdf5Writer : public Writer {
 
  private:
   void check(herr_t status) const {
-    if (status < 0) throw StorageError(fmt::format("{}: cannot be written; is the disk full?", name_), true);
+    if (status < 0) throw InputError::in(name_, "cannot be written; is the disk full?");
   }
 
   Handle checked(hid_t object, Handle::Close closing) const {

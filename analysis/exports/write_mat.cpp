@@ -120,8 +120,8 @@ Variable value_of(const Collected& collected, std::uint64_t frames) {
 class MatFile {
  public:
   explicit MatFile(const std::filesystem::path& path)
-      : out_(path), memory_(::memfd_create("tunnelrig-mat", MFD_CLOEXEC)) {
-    if (memory_ < 0) fail_to_write(path.string());
+      : name_(path.string()), out_(path), memory_(::memfd_create("tunnelrig-mat", MFD_CLOEXEC)) {
+    if (memory_ < 0) fail_to_write(name_);
     memory_name_ = fmt::format("/proc/self/fd/{}", memory_);
   }
   ~MatFile() { ::close(memory_); }
@@ -130,11 +130,11 @@ class MatFile {
 
   void add(matvar_t* variable) {
     mat_t* file = Mat_CreateVer(memory_name_.c_str(), "tunnelrig-export/1", MAT_FT_MAT5);
-    if (file == nullptr) fail_to_write(memory_name_);
+    if (file == nullptr) fail_to_write(name_);
     const int written = Mat_VarWrite(file, variable, MAT_COMPRESSION_NONE);
-    if (Mat_Close(file) != 0 || written != 0) fail_to_write(memory_name_);
+    if (Mat_Close(file) != 0 || written != 0) fail_to_write(name_);
     struct stat info {};
-    if (::fstat(memory_, &info) != 0) fail_to_write(memory_name_);
+    if (::fstat(memory_, &info) != 0) fail_to_write(name_);
     append(static_cast<std::size_t>(info.st_size));
   }
 
@@ -144,13 +144,14 @@ class MatFile {
   void append(std::size_t size) {
     for (std::size_t at = empty_ ? 0 : kMatHeader; at < size;) {
       const ssize_t got = ::pread(memory_, buffer_.data(), buffer_.size(), static_cast<off_t>(at));
-      if (got <= 0) fail_to_write(memory_name_);
+      if (got <= 0) fail_to_write(name_);
       out_.write(std::span(buffer_).first(static_cast<std::size_t>(got)));
       at += static_cast<std::size_t>(got);
     }
     empty_ = false;
   }
 
+  std::string name_;
   OutputFile out_;
   int memory_;
   std::string memory_name_;

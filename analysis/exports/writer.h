@@ -18,7 +18,7 @@ struct Block {
 };
 
 /// Writes one export. Calls come in the order begin, block …, end for each recording, then tables, groups and
-/// texts, then finish. Throws StorageError naming the file where it cannot be written, at the latest by
+/// texts, then finish. Throws InputError naming the file where it cannot be written, at the latest by
 /// `finish`, after which all is on its way to the disk.
 class Writer {
  public:

@@ -3,6 +3,8 @@
 #include "datasets/csv.h"
 
 #include <cerrno>
+#include <csignal>
+#include <cstring>
 #include <sstream>
 #include <system_error>
 
@@ -24,9 +26,18 @@ int spawn(const std::string& program, const std::filesystem::path& folder, pid_t
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "complaint", O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  // The program ignores what ends a process at a limit of file sizes; gnuplot would not look at its writes.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t as_usual;
+  sigemptyset(&as_usual);
+  sigaddset(&as_usual, SIGXFSZ);
+  posix_spawnattr_setsigdefault(&attributes, &as_usual);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
   std::string name = program, no_user_settings = "-d", script = "script";
   char* arguments[] = {name.data(), no_user_settings.data(), script.data(), nullptr};
-  const int error = posix_spawnp(child, program.c_str(), &actions, nullptr, arguments, environ);
+  const int error = posix_spawnp(child, program.c_str(), &actions, &attributes, arguments, environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   return error;
 }
@@ -66,6 +77,7 @@ std::optional<std::string> run_gnuplot(const std::string& program, const std::fi
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
+  if (WIFSIGNALED(status)) return fmt::format("{} was ended: {}", program, sigdescr_np(WTERMSIG(status)));
   return fmt::format("{} failed: {}", program, last_line(read_text(folder / "complaint")));
 }
 

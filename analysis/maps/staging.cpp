@@ -8,7 +8,8 @@
 
 namespace tunnelrig {
 
-Staging::Staging(const std::filesystem::path& target, const std::string& what) : target_(target) {
+Staging::Staging(const std::filesystem::path& target, const std::string& what)
+    : target_(target), folders_(target) {
   std::error_code error;
   std::filesystem::create_directories(target, error);
   std::string name = (target / ".scratch-XXXXXX").string();

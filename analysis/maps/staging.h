@@ -1,13 +1,17 @@
 // Files that appear all or none: made in a scratch folder first, then renamed to their place.
 #pragma once
 
+#include "datasets/output_place.h"
+
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
 namespace tunnelrig {
 
-/// A scratch folder within the target, so that renaming out of it stays on one file system; gone afterwards.
+/// A scratch folder within the target, so that renaming out of it stays on one file system; gone afterwards,
+/// and the target with it where it was made for this and nothing was published.
 class Staging {
  public:
   /// Makes the target where it is missing. Throws InputError naming it where that cannot be, with `what` is
@@ -19,12 +23,16 @@ class Staging {
 
   const std::filesystem::path& path() const { return path_; }
 
+  /// Calls `write`, which writes to `path()`; where it fails its message names the target (output_place.h).
+  void write(const std::function<void()>& write) const { write_as(target_, path_, write); }
+
   /// Renames files of the scratch folder into the target, after a look at what alone could stop that
   /// half-way. Returns where they are now; throws InputError naming the file that is in the way.
   std::vector<std::filesystem::path> publish(const std::vector<std::string>& names) const;
 
  private:
   std::filesystem::path target_, path_;
+  FoldersForOutput folders_;
 };
 
 }  // namespace tunnelrig

@@ -103,13 +103,15 @@ WrittenMaps write_maps(const std::filesystem::path& folder, const TunnelMaps& ma
 
   const Staging staging(folder, "maps");
   std::vector<std::string> names;
-  for (const auto& [name, text] : texts) {
-    write_text(staging.path() / name, text);
-    names.push_back(name);
-  }
-  written.warning = run_gnuplot(
-      settings.gnuplot, staging.path(),
-      scripts(delta_ct, grid, maps, map.delta_ct_fit) + scripts(uneven, grid, maps, map.uneven_thrust_fit));
+  staging.write([&] {
+    for (const auto& [name, text] : texts) {
+      write_text(staging.path() / name, text);
+      names.push_back(name);
+    }
+    written.warning = run_gnuplot(
+        settings.gnuplot, staging.path(),
+        scripts(delta_ct, grid, maps, map.delta_ct_fit) + scripts(uneven, grid, maps, map.uneven_thrust_fit));
+  });
   if (!written.warning) names.insert(names.end(), kPictures.begin(), kPictures.end());
   written.files = staging.publish(names);
   for (const char* picture : kPictures) {

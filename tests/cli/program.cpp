@@ -9,11 +9,12 @@
 
 namespace tunnelrig::test {
 
-ProgramResult run_program(const std::filesystem::path& folder, const std::string& arguments) {
+ProgramResult run_program(const std::filesystem::path& folder, const std::string& arguments,
+                          const std::string& before) {
   const TemporaryFolder scratch;
-  const std::string command = "cd '" + folder.string() + "' && '" TUNNELRIG_PROGRAM "' " + arguments + " >'" +
-                              (scratch / "out").string() + "' 2>'" + (scratch / "error").string() +
-                              "' </dev/null";
+  const std::string command = "cd '" + folder.string() + "' && " + before + " && '" TUNNELRIG_PROGRAM "' " +
+                              arguments + " >'" + (scratch / "out").string() + "' 2>'" +
+                              (scratch / "error").string() + "' </dev/null";
   const int status = std::system(command.c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text(scratch / "out"),
           read_text(scratch / "error")};

@@ -10,7 +10,9 @@ struct ProgramResult {
   std::string out, error;
 };
 
-/// Runs `tunnelrig ARGUMENTS` by the shell, in `folder`.
-ProgramResult run_program(const std::filesystem::path& folder, const std::string& arguments);
+/// Runs `tunnelrig ARGUMENTS` by the shell, in `folder`, after what the shell is to do before ("ulimit -f
+/// 10").
+ProgramResult run_program(const std::filesystem::path& folder, const std::string& arguments,
+                          const std::string& before = "true");
 
 }  // namespace tunnelrig::test

@@ -72,13 +72,15 @@ WrittenFigures write_figures(const std::filesystem::path& folder, const Campaign
     script +=
         report::terminal(figure.sheet, settings.format, names.back()) + figure.script + "unset output\n";
   }
-  if (const auto failed = run_gnuplot(settings.gnuplot, staging.path(), script))
-    throw InputError(fmt::format("figures cannot be drawn: {}", *failed));
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const auto path = staging.path() / names[i];
-    write_text(path, report::completed(read_text(path), figures.drawn[i].sheet, settings.format));
-  }
-  write_text(staging.path() / kCaptions, captions(figures.drawn, report, settings));
+  staging.write([&] {
+    if (const auto failed = run_gnuplot(settings.gnuplot, staging.path(), script))
+      throw InputError(fmt::format("figures cannot be drawn: {}", *failed));
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const auto path = staging.path() / names[i];
+      write_text(path, report::completed(read_text(path), figures.drawn[i].sheet, settings.format));
+    }
+    write_text(staging.path() / kCaptions, captions(figures.drawn, report, settings));
+  });
   names.emplace_back(kCaptions);
   return {staging.publish(names), figures.absent};
 }

@@ -2,6 +2,7 @@
 
 #include "datasets/csv.h"
 #include "published_input.h"
+#include "support/little_room.h"
 #include "support/temporary_folder.h"
 
 #include <algorithm>
@@ -118,6 +119,32 @@ TEST(WriteMaps, WritesAllOrNothing) {
   write_text(folder / "file", "");
   EXPECT_THAT(message_of([&] { write_maps(folder / "file", example(), without_pictures()); }),
               HasSubstr("file: maps cannot be written here"));
+}
+
+TEST(WriteMaps, WhatFailsNamesTheTargetAndLeavesNoFolder) {
+  const test::TemporaryFolder folder;
+  const auto failure_in = [](const std::filesystem::path& target) {
+    const test::LittleRoom room(1000);
+    return message_of([&] { write_maps(target, example(), without_pictures()); });
+  };
+  EXPECT_EQ(failure_in(folder / "a/b"),
+            (folder / "a/b/disturbance_map.json").string() + ": cannot be written: File too large");
+  EXPECT_FALSE(std::filesystem::exists(folder / "a"));
+  std::filesystem::create_directory(folder / "mine");
+  EXPECT_THAT(failure_in(folder / "mine/new"), HasSubstr("mine/new/disturbance_map.json: cannot be"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "mine"));
+}
+
+/// gnuplot does not look whether its writes succeed; it must not inherit that the signal is ignored.
+TEST(WriteMaps, APlotterAtTheLimitOfFileSizesIsEnded) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "plotter", "#!/bin/sh\nkill -s XFSZ $$\n");
+  std::filesystem::permissions(folder / "plotter", std::filesystem::perms::owner_all);
+  WriteSettings settings;
+  settings.gnuplot = folder / "plotter";
+  const test::LittleRoom ample(1 << 30);
+  EXPECT_THAT(write_maps(folder / "maps", example(), settings).warning.value_or(""),
+              HasSubstr("plotter was ended: File size limit exceeded"));
 }
 
 TEST(WriteMaps, DrawsEveryPicture) {

@@ -209,7 +209,7 @@ TEST_F(FiguresTest, ABadRequestLeavesNothing) {
                 HasSubstr("from 60 to 400 mm"));
   EXPECT_THAT(message_of([&] { write(settings(), {.gnuplot = "/nonexistent/gnuplot"}); }),
               HasSubstr("/nonexistent/gnuplot is not installed"));
-  EXPECT_TRUE(std::filesystem::is_empty(out));
+  EXPECT_FALSE(std::filesystem::exists(out));
   EXPECT_THAT(message_of([] { figure_format("eps"); }), HasSubstr("there are pdf, svg and png"));
   std::filesystem::remove(db);
   test::make_table(db);

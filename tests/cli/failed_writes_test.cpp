@@ -1,0 +1,85 @@
+// Writes that fail, by a limit of file sizes that stands for a full disk: a message that names what the user
+// asked for, an exit code, nothing left behind.
+#include "cli/program.h"
+#include "datasets/csv.h"
+#include "support/example_campaign.h"
+#include "support/temporary_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunnelrig {
+namespace {
+
+namespace fs = std::filesystem;
+using test::ProgramResult;
+using testing::AnyOf;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::Not;
+
+// In blocks of 512 bytes. Reading a campaign file takes 32 kB beside it, which SQLite shares between
+// processes.
+constexpr const char* kLittleRoom = "ulimit -f 128";
+
+struct FailedWrites : testing::Test {
+  test::TemporaryFolder folder;
+
+  std::vector<std::string> left() const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder.path()))
+      names.push_back(entry.path().filename().string());
+    return names;
+  }
+};
+
+TEST_F(FailedWrites, OfAnImport) {
+  test::ExampleCampaign().write(folder / "source", 20000);
+  const ProgramResult result = test::run_program(folder.path(), "import source --db c.db", kLittleRoom);
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.error, HasSubstr("disk I/O error: is the disk full"));
+  EXPECT_THAT(left(), testing::ElementsAre("source"));
+}
+
+TEST_F(FailedWrites, ACampaignFileThatCannotBeOpenedForLackOfRoomIsNotCalledDamaged) {
+  test::ExampleCampaign().write(folder / "source");
+  ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
+  const ProgramResult result = test::run_program(folder.path(), "reduce --db c.db", "ulimit -f 20");
+  EXPECT_EQ(result.code, 2);
+  EXPECT_THAT(result.error, HasSubstr("c.db: disk I/O error: is the disk full"));
+}
+
+TEST_F(FailedWrites, OfAnExportNameTheTarget) {
+  test::ExampleCampaign().write(folder / "source", 20000);
+  ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
+  for (const std::string format : {"folder", "hdf5", "mat", "csv", "npy"}) {
+    for (const auto& [target, before] :
+         {std::pair<const char*, const char*>{"out", kLittleRoom}, {"/proc/out", "true"}}) {
+      const ProgramResult result =
+          test::run_program(folder.path(), "export --db c.db --format " + format + " " + target, before);
+      EXPECT_EQ(result.code, 2) << format << "\n" << result.error;
+      EXPECT_THAT(result.error, AnyOf(HasSubstr(fmt::format(" {}: cannot be written", target)),
+                                      HasSubstr(fmt::format(" {}/raw/R1", target))));
+      EXPECT_THAT(result.error, Not(HasSubstr(".part"))) << format;
+    }
+    EXPECT_THAT(left(), testing::UnorderedElementsAre("source", "c.db")) << format;
+  }
+  const ProgramResult above =
+      test::run_program(folder.path(), "export --db c.db --format csv a/b/out", kLittleRoom);
+  EXPECT_EQ(above.code, 2);
+  EXPECT_FALSE(fs::exists(folder / "a"));
+}
+
+TEST_F(FailedWrites, OfAFlightLeaveNoEmptyFolder) {
+  write_text(folder / "short.toml",
+             "format = \"tunnelrig-scenario/1\"\nname = \"short\"\n[[segments]]\nkind = \"circle\"\n"
+             "centre = [0, 0.65]\nradius_m = 0.1\nrate_rad_s = 1.5\nturns = 0.1\n");
+  const ProgramResult result =
+      test::run_program(folder.path(), "fly --scenario short.toml --runs 1 --out a/b", "ulimit -f 1");
+  EXPECT_EQ(result.code, 2);
+  EXPECT_THAT(result.error, EndsWith("a/b/comparison.csv: cannot be written: File too large\n"));
+  EXPECT_THAT(left(), testing::ElementsAre("short.toml"));
+}
+
+}  // namespace
+}  // namespace tunnelrig
