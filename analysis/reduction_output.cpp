@@ -1,7 +1,10 @@
 #include "analysis/reduction_output.h"
 
 #include "datasets/error.h"
+#include "datasets/locations.h"
+#include "datasets/open_space.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
@@ -166,6 +169,17 @@ MapInput map_input(const CampaignData& data, const Summary& summary, const std::
   for (const Eigen::MatrixXd& part : summary.u_over_root_dof)
     input.u_over_root_dof.emplace_back(part(rows, rows));
   return input;
+}
+
+std::vector<std::string> not_on_the_map(const CampaignData& data, const Summary& summary) {
+  std::vector<std::string> labels;
+  for (const LocationSummary& location : summary.locations) {
+    const bool elsewhere = std::ranges::any_of(data.runs, [&](const Run& run) {
+      return canonical_location(run.location) == location.label && in_open_space(run);
+    });
+    if (!location.y_norm && !elsewhere) labels.push_back(location.label);
+  }
+  return labels;
 }
 
 }  // namespace tunnelrig

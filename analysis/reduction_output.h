@@ -6,6 +6,7 @@
 #include "analysis/maps/map_input.h"
 
 #include <string>
+#include <vector>
 
 namespace tunnelrig {
 
@@ -25,5 +26,10 @@ std::string reduction_json(const CampaignData& data, const Reduction& reduction,
 /// The tunnel locations as a map takes them. Throws InputError for a campaign without tunnel or without four
 /// rotors.
 MapInput map_input(const CampaignData& data, const Summary& summary, const std::string& source);
+
+/// Labels of the locations that a map leaves out although they are not in open space (a label of it, or a
+/// distance to ground or ceiling): their labels are not of the tunnel's grid, and their runs have no y_norm
+/// and z_norm.
+std::vector<std::string> not_on_the_map(const CampaignData& data, const Summary& summary);
 
 }  // namespace tunnelrig

@@ -4,6 +4,7 @@
 #include "cli/console.h"
 #include "cli/verb.h"
 #include "datasets/error.h"
+#include "datasets/first_few.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +15,8 @@
 
 namespace tunnelrig::cli {
 namespace {
+
+constexpr std::size_t kNamedLocations = 6;  // in a warning
 
 struct MapOptions {
   std::string db, out, method = "gaussian-process", model, terms;
@@ -54,6 +57,11 @@ int run_map(const MapOptions& options) {
   const CampaignData data = read_campaign_data(file);
   const Reduction reduction = reduce_by(data, choose_model(file, options.model, options.terms));
   const Summary summary = summarize_locations(data, reduction);
+  const std::vector<std::string> not_on_map = not_on_the_map(data, summary);
+  if (!not_on_map.empty())
+    warn(fmt::format(
+        "not on the map: {}; neither a label of the tunnel's grid nor y_norm and z_norm say where",
+        first_few(not_on_map, kNamedLocations)));
   const TunnelMaps maps =
       fit_maps(map_input(data, summary, options.db), {.method = map_method(options.method)});
   const nlohmann::json provenance{{"program", "tunnelrig " + program_version()},
@@ -88,6 +96,7 @@ int run_map(const MapOptions& options) {
                                 {"method", written.map.method},
                                 {"model", reduction.model_name()},
                                 {"locations", written.map.locations.size()},
+                                {"not_on_the_map", not_on_map},
                                 {"delta_ct", fit_json(written.map.delta_ct_fit)},
                                 {"uneven_thrust", fit_json(written.map.uneven_thrust_fit)}};
     for (const auto& path : written.files) json["files"].push_back(path.string());

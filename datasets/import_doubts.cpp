@@ -2,6 +2,7 @@
 
 #include "datasets/locations.h"
 #include "datasets/plausible.h"
+#include "datasets/run_columns.h"
 
 #include <algorithm>
 #include <cmath>
@@ -29,6 +30,18 @@ void doubt_labels(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doub
       doubts.push_back(fmt::format(
           "{}: '{}' is no number, as {} other cells are: the whole column is kept as text",
           sheet.where(first.at(column), column), sheet.text(first.at(column), column), numbers[column]));
+}
+
+/// A column that is one of ours but for capitals, so that nothing reads it.
+void doubt_columns(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doubts) {
+  for (const std::string& column : sheet.columns) {
+    const std::string_view known = known_but_for_case(column);
+    if (known.empty()) continue;
+    const bool numbers =
+        std::any_of(runs.begin(), runs.end(), [&](const Run& run) { return run.numbers.contains(column); });
+    doubts.push_back(fmt::format("{}:1: column '{}' is kept as a {}; is '{}' meant?", sheet.file, column,
+                                 numbers ? "covariate" : "label", known));
+  }
 }
 
 /// Thrusts in grams, or of another rotor.
@@ -67,6 +80,7 @@ void doubt_places(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doub
 std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& runs_sheet,
                                        const std::vector<Run>& runs) {
   Doubts doubts = info.unread;
+  doubt_columns(runs_sheet, runs, doubts);
   doubt_labels(runs_sheet, runs, doubts);
   doubt_thrusts(info, runs_sheet, runs, doubts);
   doubt_places(runs_sheet, runs, doubts);

@@ -1,6 +1,7 @@
 #include "datasets/campaign.h"
 #include "datasets/error.h"
 #include "datasets/locations.h"
+#include "datasets/run_columns.h"
 
 #include <algorithm>
 #include <array>
@@ -83,12 +84,17 @@ void check_units(const Sheet& sheet) {
   }
 }
 
-/// How spreadsheets and programs write that there is no number.
-bool stands_for_no_number(std::string cell) {
-  static const std::set<std::string_view> kNone = {"nan", "na", "n/a", "#n/a", "null", "inf", "-inf"};
-  std::transform(cell.begin(), cell.end(), cell.begin(),
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return kNone.contains(cell);
+  return lower;
+}
+
+/// How spreadsheets and programs write that there is no number.
+bool stands_for_no_number(std::string_view cell) {
+  static const std::set<std::string_view> kNone = {"nan", "na", "n/a", "#n/a", "null", "inf", "-inf"};
+  return kNone.contains(lower_case(cell));
 }
 
 /// Numbers among what may be no number; labels else.
@@ -222,6 +228,18 @@ void check_source(const Sheet& sheet, const Run& run, const CampaignInfo& campai
 }
 
 }  // namespace
+
+std::string_view known_but_for_case(std::string_view column) {
+  const std::string lower = lower_case(column);
+  const auto is_meant = [&](std::string_view known) { return known != column && lower_case(known) == lower; };
+  for (const std::string_view known : kText)
+    if (is_meant(known)) return known;
+  for (const KnownColumn& known : kKnown)
+    if (is_meant(known.name)) return known.name;
+  for (const char* known : {"thrust_4_N", "source"})
+    if (is_meant(known)) return known;
+  return {};
+}
 
 CampaignInfo at_speed(CampaignInfo campaign, std::optional<double> measured_rpm) {
   if (measured_rpm.value_or(0) > 0) campaign.rig.nominal_speed_rpm = *measured_rpm;

@@ -2,6 +2,7 @@
 #include "analysis/reduction.h"
 #include "analysis/residual/campaign_conditions.h"
 #include "datasets/error.h"
+#include "datasets/open_space.h"
 
 #include <algorithm>
 #include <cmath>
@@ -189,10 +190,7 @@ void add_derived_covariates(const Source& source, Observations& result) {
 
 /// Open space has one coefficient for all heights where the baseline says so.
 std::string group_of(const Run& run, const std::string& baseline) {
-  const bool open = !run.in_tunnel() && (run.location == "OS" || run.location.starts_with("GND") ||
-                                         run.location.starts_with("CEIL") || run.number(kGroundDistance) ||
-                                         run.number(kCeilingDistance));
-  return baseline == "open_space" && open ? kOpenSpace : run.location;
+  return baseline == "open_space" && in_open_space(run) ? kOpenSpace : run.location;
 }
 
 int index_in(std::vector<std::string>& names, const std::string& name) {

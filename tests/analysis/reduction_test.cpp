@@ -272,5 +272,15 @@ TEST(Locations, TheMapsU95OfUIsTheirs) {
   }
 }
 
+TEST(Locations, ThoseThatAreNotOnTheMapAreNamed) {
+  std::string rows;
+  for (const char* label : {"OT", "h4v2", "OS", "GND2", "CEIL1.5", "bench", "left corner"})
+    rows += fmt::format("{},{},1,S1,2026-03-02T08:00Z,,7.1,7.4,7.2,7.3,20,,,\n", label, label);
+  CampaignData data = given_thrusts(rows);
+  data.runs[5].numbers["ground_distance_R"] = 2;
+  const Summary summary = summarize_locations(data, reduce_runs(data, {}));
+  EXPECT_THAT(not_on_the_map(data, summary), testing::UnorderedElementsAre("h4v2", "left corner"));
+}
+
 }  // namespace
 }  // namespace tunnelrig

@@ -218,6 +218,24 @@ TEST_F(Chain, JsonForMachines) {
   EXPECT_NEAR(propeller / thesis, 3.14159265 * 3.14159265 * 3.14159265 / 32, 1e-6);
 }
 
+TEST_F(Chain, AMisspeltLocationDoesNotLeaveTheMapInSilence) {
+  test::ExampleCampaign campaign;
+  campaign.runs_csv =
+      "run,location,repeat,session,start_utc,raw,thrust_1_N,thrust_2_N,thrust_3_N,thrust_4_N,air_temperature_"
+      "C\n";
+  for (const char* location : {"OT", "H2V0", "H4V2", "H4V-2", "h4v0", "OS"})
+    campaign.runs_csv +=
+        fmt::format("{},{},1,S1,2026-03-02T08:00Z,,7.1,7.4,7.2,7.3,20\n", location, location);
+  campaign.write(folder / "source");
+  expect_well("import source --db c.db");
+  const ProgramResult result = run("map --db c.db --out m --json");
+  EXPECT_EQ(result.code, 0);
+  EXPECT_THAT(result.error, HasSubstr("warning: not on the map: h4v0; neither a label"));
+  const auto json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json["not_on_the_map"], nlohmann::json::array({"h4v0"}));
+  EXPECT_EQ(json["locations"], 4);
+}
+
 TEST_F(Chain, MeasuredConditionsEnterOnlyByName) {
   expect_well("plan --out plan.csv --tunnel-only --repeats 2 --duration 2");
   expect_well("log --db c.db --plan plan.csv --speed max");

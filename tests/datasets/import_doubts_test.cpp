@@ -53,6 +53,17 @@ TEST(ImportDoubts, ATextAmongNumbersMakesALabel) {
       << "many texts are labels";
 }
 
+TEST(ImportDoubts, AColumnThatIsOursButForCapitals) {
+  EXPECT_THAT(
+      doubts(kToml, runs("Excluded,Relative_Humidity", {"gust,0.4", ",0.5", ",", ",0.4"})),
+      ElementsAre("runs.csv:1: column 'Excluded' is kept as a label; is 'excluded' meant?",
+                  "runs.csv:1: column 'Relative_Humidity' is kept as a covariate; is 'relative_humidity' "
+                  "meant?"));
+  EXPECT_THAT(doubts(kToml, runs("Kind,LOCATION", {"tare,x"})),
+              ElementsAre(HasSubstr("is 'kind' meant?"), HasSubstr("is 'location' meant?")));
+  EXPECT_THAT(doubts(kToml, runs("excluded,kinds", {",a"})), IsEmpty());
+}
+
 TEST(ImportDoubts, GramsAreNoNewtons) {
   EXPECT_THAT(
       doubts(kToml, runs("fan_rpm", kNumbers, "700,7,7,7")),
