@@ -1,4 +1,4 @@
-// What `doctor` looks at: whether a campaign file is whole, accounted for, and fit to be reduced.
+// What `doctor` looks at: whether a campaign file is whole, accounted for, and fit to be reduced and mapped.
 #pragma once
 
 #include "analysis/campaign_data.h"

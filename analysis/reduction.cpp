@@ -96,7 +96,7 @@ Tares tares_of(const CampaignData& data) {
     const std::vector<ChannelStatistics>& channels = data.statistics.at(run.run).channels;
     const double half_s =
         0.5 * static_cast<double>(data.raw.at(run.run).frames) / data.info.daq.sample_rate_hz;
-    TareReading reading{.session = run.session, .time_s = run.start_s + half_s};
+    TareReading reading{.session = run.session, .time_s = run.start_s + half_s, .run = run.run};
     for (std::size_t c = 0; c < std::min<std::size_t>(channels.size(), kMaxRotors); ++c) {
       reading.mean_V[c] = channels[c].mean_V;
       reading.standard_error_V[c] = channels[c].standard_error_V;

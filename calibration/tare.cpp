@@ -15,8 +15,8 @@ void check(const TareReading& reading) {
            std::isfinite(reading.standard_error_V[channel]) && reading.standard_error_V[channel] >= 0;
   }
   if (good) return;
-  throw InputError(fmt::format("a tare of session {} at {:.0f} s has no finite mean and standard error",
-                               reading.session, reading.time_s));
+  throw InputError(fmt::format("a tare of session {} at {:.0f} s ({}) has no finite mean and standard error",
+                               reading.session, reading.time_s, reading.run));
 }
 
 }  // namespace
@@ -30,8 +30,11 @@ Tares::Tares(std::vector<TareReading> readings) : readings_(std::move(readings))
     std::sort(session.begin(), session.end(),
               [&](std::size_t a, std::size_t b) { return readings_[a].time_s < readings_[b].time_s; });
     for (std::size_t i = 1; i < session.size(); ++i) {
-      if (readings_[session[i]].time_s > readings_[session[i - 1]].time_s) continue;
-      throw InputError(fmt::format("session {} has two tares at one time", name));
+      const TareReading &before = readings_[session[i - 1]], &here = readings_[session[i]];
+      if (here.time_s > before.time_s) continue;
+      throw InputError(fmt::format(
+          "session {} has two tares at one time, {} and {}: correct start_utc of one, or exclude it", name,
+          before.run, here.run));
     }
   }
   estimate_wander();

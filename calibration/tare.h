@@ -18,6 +18,7 @@ struct TareReading {
   double time_s = 0;  // its middle
   std::array<double, kMaxRotors> mean_V{};
   std::array<double, kMaxRotors> standard_error_V{};
+  std::string run = {};  // for messages
 };
 
 /// The zero of one moment: the sum of weight · mean_V over tares of its session.
@@ -42,8 +43,8 @@ struct TareZero {
 /// is 0.
 class Tares {
  public:
-  /// Throws InputError naming session for a value that is not finite, a negative standard error, or two tares
-  /// at one time.
+  /// Throws InputError naming session and runs for a value that is not finite, a negative standard error, or
+  /// two tares at one time.
   explicit Tares(std::vector<TareReading> readings);
 
   /// Nothing where the session has no tare: the calibration's zero takes its place (Certificate::force).

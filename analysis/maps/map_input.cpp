@@ -22,12 +22,15 @@ constexpr double kOnALine = 0.01;
 
 void check_geometry(const MapInput& input) {
   const MapGeometry& g = input.geometry;
-  for (const double length :
-       {g.vehicle_width_m, g.vehicle_height_m, g.tunnel_width_m, g.tunnel_height_m, g.propeller_radius_m}) {
-    if (!std::isfinite(length) || length <= 0) {
-      throw InputError::in(input.source, "a length of the vehicle or tunnel is {} m; it must be above 0",
-                           length);
-    }
+  for (const auto& [key, length_m] :
+       {std::pair<const char*, double>{"rig.vehicle_width_m", g.vehicle_width_m},
+        {"rig.vehicle_height_m", g.vehicle_height_m},
+        {"tunnel.width_m", g.tunnel_width_m},
+        {"tunnel.height_m", g.tunnel_height_m},
+        {"rig.propeller_radius_m", g.propeller_radius_m}}) {
+    if (std::isfinite(length_m) && length_m > 0) continue;
+    throw InputError::in(input.source, "{} of campaign.toml is {}; a map needs it, above 0", key,
+                         length_m == 0 ? "missing or 0" : fmt::format("{} m", length_m));
   }
   if (g.vehicle_width_m >= g.tunnel_width_m || g.vehicle_height_m >= g.tunnel_height_m) {
     throw InputError::in(input.source,

@@ -148,6 +148,41 @@ TEST_F(Health, OneRecordingOfTwoRuns) {
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("raw data: the same frames in R1 and R2"));
 }
 
+/// What `reduce` would refuse.
+TEST_F(Health, TwoTaresAtOneTime) {
+  const auto with_second_tare = [&](const char* start) {
+    campaign.runs_csv = fmt::format(
+        "run,location,repeat,session,start_utc,raw,kind,air_temperature_C\n"
+        "T1,OT,1,S1,2026-03-02T08:00:00Z,raw/R1.npy,tare,20\nT2,OT,2,S1,{},raw/R2.npy,tare,20\n"
+        "R3,OT,1,S1,2026-03-02T08:05:00Z,raw/R3.npy,,20\n",
+        start);
+    import();
+    calibrate_file();
+    return found(Severity::kProblem);
+  };
+  EXPECT_THAT(with_second_tare("2026-03-02T08:00:00Z"),
+              HasSubstr("tares: session S1 has two tares at one time, T1 and T2: correct start_utc"));
+  EXPECT_THAT(found(Severity::kGood), testing::Not(HasSubstr("tares")));
+  EXPECT_EQ(with_second_tare("2026-03-02T08:10:00Z"), "");
+  EXPECT_THAT(found(Severity::kGood), HasSubstr("tares: every session has one"));
+}
+
+/// What `map` would refuse.
+TEST_F(Health, ATunnelWithoutTheVehiclesSize) {
+  import();
+  EXPECT_THAT(found(Severity::kNote), testing::Not(HasSubstr("geometry")));
+  const auto at = campaign.campaign_toml.find("vehicle_width_m");
+  campaign.campaign_toml.erase(at, campaign.campaign_toml.find('\n', at) - at);
+  import();
+  EXPECT_THAT(found(Severity::kNote),
+              HasSubstr("geometry: campaign.toml has [tunnel] without rig.vehicle_width_m\n"));
+  campaign.campaign_toml.erase(campaign.campaign_toml.find("[tunnel]"),
+                               std::string("[tunnel]\nwidth_m = 1.5\nheight_m = 1.5\n").size());
+  import();
+  EXPECT_THAT(found(Severity::kNote), testing::Not(HasSubstr("geometry")))
+      << "in open space it is not needed";
+}
+
 TEST_F(Health, WhatIsExcludedIsNotHeldAgainstTheRest) {
   campaign.runs_csv.replace(campaign.runs_csv.find("raw/R2.npy"), 10, "raw/R1.npy");
   const auto header = campaign.runs_csv.find('\n');

@@ -16,7 +16,7 @@ using test::message_of;
 using testing::HasSubstr;
 
 TareReading tare(const char* session, double time_s, double mean_V, double standard_error_V = 0) {
-  TareReading reading{.session = session, .time_s = time_s};
+  TareReading reading{.session = session, .time_s = time_s, .run = fmt::format("tare of {:g} V", mean_V)};
   for (std::size_t channel = 0; channel < kMaxRotors; ++channel) {
     reading.mean_V[channel] = mean_V + static_cast<double>(channel);
     reading.standard_error_V[channel] = standard_error_V;
@@ -121,10 +121,11 @@ TEST(Tare, RefusesTaresThatAreNone) {
   EXPECT_THAT(message_of([] { Tares({tare("S1", 5, std::nan(""))}); }), HasSubstr("session S1"));
   EXPECT_THAT(message_of([] { Tares({tare("S1", 5, 1, -1)}); }),
               HasSubstr("no finite mean and standard error"));
-  EXPECT_THAT(message_of([] {
-                Tares({tare("S1", 5, 1), tare("S1", 5, 2)});
-              }),
-              HasSubstr("session S1 has two tares"));
+  EXPECT_THAT(
+      message_of([] {
+        Tares({tare("S1", 5, 1), tare("S1", 5, 2)});
+      }),
+      HasSubstr("session S1 has two tares at one time, tare of 1 V and tare of 2 V: correct start_utc"));
 }
 
 }  // namespace

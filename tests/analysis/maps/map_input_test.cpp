@@ -104,7 +104,10 @@ TEST(MapInput, RefusesAVehicleThatDoesNotFit) {
   input.geometry.vehicle_width_m = 1.6;
   EXPECT_THAT(refusal(input), HasSubstr("does not fit a tunnel of 1.5 m × 1.5 m"));
   input.geometry.vehicle_width_m = 0;
-  EXPECT_THAT(refusal(input), HasSubstr("must be above 0"));
+  EXPECT_THAT(refusal(input), HasSubstr("rig.vehicle_width_m of campaign.toml is missing or 0"));
+  input.geometry.vehicle_height_m = -1;
+  input.geometry.vehicle_width_m = 0.7;
+  EXPECT_THAT(refusal(input), HasSubstr("rig.vehicle_height_m of campaign.toml is -1 m"));
 }
 
 TEST(MapInput, OriginUnderBothNamesIsOneLocation) {

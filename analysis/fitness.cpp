@@ -1,0 +1,244 @@
+// The doctor's second half: whether a campaign is fit to be reduced and mapped.
+#include "analysis/findings.h"
+#include "analysis/implausible_thrust.h"
+#include "analysis/reduction.h"
+#include "datasets/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <tuple>
+
+namespace tunnelrig {
+namespace {
+
+constexpr double kSpeedTolerance = 0.003;    // of the nominal speed, the thesis's ±15 rev/min
+constexpr double kTachometerAgrees = 0.005;  // shaft line against tachometer
+constexpr double kRateAgrees = 1e-3;         // board's clock against campaign.toml
+
+class Fitness : public Findings {
+ public:
+  Fitness(const CampaignFile& file, const CampaignData& data) : file_(file), data_(data) {}
+
+  void calibration() {
+    const bool needed = !data_.raw.empty();
+    if (!needed) return;
+    const auto points = file_.calibration_points();
+    if (!data_.certificate) {
+      problem("calibration", "none, so no run can be reduced",
+              points.empty() ? "`tunnelrig calibrate --points calibration.csv`" : "`tunnelrig calibrate`");
+      return;
+    }
+    if (data_.certificate->points_hash != hash_of(points, file_.propeller_tests())) {
+      problem("calibration", "made from other points than the file holds", "`tunnelrig calibrate`");
+    }
+    Names failed;
+    for (const CalibrationGate& gate : data_.certificate->gates) {
+      if (!gate.passed) failed.add(fmt::format("cell {} {} ({})", gate.cell, gate.name, gate.finding));
+    }
+    if (!failed.empty())
+      problem("calibration", "gates not passed: " + failed.text(),
+              "look at the certificate; calibrate these cells again");
+    else
+      good("calibration", fmt::format("certificate {} passed all gates", data_.certificate_id));
+  }
+
+  void tares() {
+    try {
+      tares_of(data_);
+    } catch (const InputError& error) {
+      problem("tares", error.what(),
+              "`reduce`, and all that comes after it, refuses the campaign until then");
+      return;
+    }
+    std::set<std::string> tared, all;
+    for (const std::size_t tare : tare_runs(data_)) tared.insert(data_.runs[tare].session);
+    for (const Run& run : data_.runs)
+      if (run.kind == RunKind::kThrust && run.excluded.empty() && data_.raw.contains(run.run))
+        all.insert(run.session);
+    Names without;
+    for (const std::string& session : all) {
+      if (!tared.contains(session)) without.add(session);
+    }
+    if (without.empty()) {
+      if (!all.empty()) good("tares", "every session has one");
+      return;
+    }
+    note("tares",
+         fmt::format("none in {}: their zero is the calibration's, extrapolated from {:.1f} N",
+                     without.text(), lowest_calibrated_N()),
+         "record a tare (motors stopped) before and after each session: `tunnelrig log --kind tare`");
+  }
+
+  /// What a map needs and nothing else does.
+  void geometry() {
+    const Rig& rig = data_.info.rig;
+    if (!data_.info.tunnel || rig.rotors != kMaxRotors) return;
+    Names missing;
+    if (rig.vehicle_width_m <= 0) missing.add("rig.vehicle_width_m");
+    if (rig.vehicle_height_m <= 0) missing.add("rig.vehicle_height_m");
+    if (!missing.empty())
+      note("geometry", "campaign.toml has [tunnel] without " + missing.text(),
+           "`map` refuses without: write them there (metres, tip to tip) and import the campaign again");
+  }
+
+  void channels() {
+    Names stuck, dead, clipped, flagged, pattern, overloaded;
+    for (const Run& run : data_.runs) {
+      const auto statistics = data_.statistics.find(run.run);
+      if (statistics == data_.statistics.end() || !run.excluded.empty()) continue;
+      const auto raw = data_.raw.find(run.run);
+      const bool counts = raw != data_.raw.end() && is_counts(raw->second.format.type);
+      const auto ledger = raw == data_.raw.end() ? std::nullopt : ledger_of(file_, raw->second.id);
+      if (ledger && ledger->frames_test_pattern > 0) pattern.add(run.run);
+      if (ledger && ledger->frames_clipped > 0)
+        flagged.add(fmt::format("{} ({:.2g} %)", run.run,
+                                100.0 * static_cast<double>(ledger->frames_clipped) /
+                                    static_cast<double>(ledger->frames_stored)));
+      for (int rotor = 0; rotor < data_.info.rig.rotors; ++rotor) {
+        const ChannelStatistics& channel = statistics->second.channels[static_cast<std::size_t>(rotor)];
+        const std::string name = fmt::format("{} channel {}", run.run, rotor + 1);
+        if (channel.stuck())
+          stuck.add(name);
+        else if (run.kind == RunKind::kThrust && counts &&
+                 channel.std_V < kDeadNoise_counts * data_.info.daq.volts_per_count())
+          dead.add(name);
+        if (channel.clipped > 0) {
+          clipped.add(fmt::format(
+              "{} ({:.2g} %)", name,
+              100.0 * static_cast<double>(channel.clipped) / static_cast<double>(statistics->second.frames)));
+        }
+        if (data_.certificate && run.kind == RunKind::kThrust &&
+            data_.certificate->force(rotor + 1, channel.mean_V).extrapolated)
+          overloaded.add(name);
+      }
+    }
+    if (!stuck.empty())
+      problem("channels", "stuck, never change: " + stuck.text(),
+              "check cell, amplifier and plug; record these runs again");
+    if (!dead.empty())
+      problem("channels", "dead, less noise than a converter has: " + dead.text(),
+              "check cell, amplifier and plug");
+    if (!clipped.empty())
+      problem("channels", "clipped: " + clipped.text(),
+              "lower the amplifier's gain; clipped means are biased");
+    if (!flagged.empty())
+      problem("channels", "the board flags frames as clipped: " + flagged.text(),
+              "lower the amplifier's gain; clipped means are biased");
+    if (!pattern.empty())
+      problem("channels", "the board's test pattern, no measurements: " + pattern.text(),
+              "exclude these runs and record them again without the test pattern");
+    if (!overloaded.empty())
+      note("channels", "mean thrust outside the calibrated forces: " + overloaded.text(),
+           "calibrate over the range that is measured");
+    if (stuck.empty() && dead.empty() && clipped.empty() && flagged.empty() && pattern.empty())
+      good("channels", "none stuck, dead or clipped");
+  }
+
+  void metadata() {
+    for (const auto& [column, why, severity] :
+         {std::tuple<const char*, const char*, Severity>{
+              "air_temperature_C", "without it there is no density, and the run is left out",
+              Severity::kProblem},
+          {"speed_rpm", "the speed is taken for nominal", Severity::kNote},
+          {"air_pressure_Pa", "the pressure is taken for 101325 Pa; a front changes C_T by a per cent",
+           Severity::kNote}}) {
+      Names missing;
+      for (const Run& run : data_.runs) {
+        if (run.kind == RunKind::kThrust && run.excluded.empty() && !run.number(column)) missing.add(run.run);
+      }
+      if (missing.empty()) continue;
+      add({severity, "metadata", fmt::format("{} is missing in {}", column, missing.text()), why});
+    }
+  }
+
+  void speeds() {
+    Names off, disagree;
+    const double nominal = data_.info.rig.nominal_speed_rpm;
+    for (const Run& run : data_.runs) {
+      const auto read = run.number("speed_rpm");
+      if (run.kind != RunKind::kThrust || !read || !run.excluded.empty()) continue;
+      if (std::abs(*read / nominal - 1) > kSpeedTolerance)
+        off.add(fmt::format("{} ({:.0f})", run.run, *read));
+      const auto statistics = data_.statistics.find(run.run);
+      if (statistics == data_.statistics.end()) continue;
+      for (const ChannelStatistics& channel : statistics->second.channels) {
+        if (!channel.shaft_hz || std::abs(*channel.shaft_hz * 60 / *read - 1) < kTachometerAgrees) continue;
+        disagree.add(fmt::format("{} ({:.0f} against {:.0f})", run.run, *channel.shaft_hz * 60, *read));
+        break;
+      }
+    }
+    if (!off.empty())
+      note("speed",
+           fmt::format("further than {:.0f} rev/min from nominal: {}", kSpeedTolerance * nominal, off.text()),
+           "set the speed again; `reduce --with rotor_speed` uses the measured one");
+    if (!disagree.empty())
+      problem("speed", "shaft line and tachometer disagree in " + disagree.text(),
+              "find out which is right before reducing with rotor_speed");
+  }
+
+  void drifts() {
+    Names moving;
+    for (const Run& run : data_.runs) {
+      const auto statistics = data_.statistics.find(run.run);
+      if (statistics == data_.statistics.end() || !run.excluded.empty()) continue;
+      const auto& channels = statistics->second.channels;
+      const bool still = std::all_of(channels.begin(), channels.end(),
+                                     [](const auto& channel) { return channel.stationary(); });
+      if (!still) moving.add(run.run);
+    }
+    if (!moving.empty())
+      note("drift", "means that move by more than the run's noise explains: " + moving.text(),
+           "let motors and cells warm up before a run");
+  }
+
+  void thrusts() {
+    if (const auto doubt = implausible_thrust(data_)) problem("thrusts", doubt->found, doubt->advice);
+  }
+
+  void rates() {
+    Names wrong;
+    for (const auto& [name, run] : data_.raw) {
+      const auto ledger = ledger_of(file_, run.id);
+      if (ledger && ledger->board_rate_hz &&
+          std::abs(*ledger->board_rate_hz / data_.info.daq.sample_rate_hz - 1) > kRateAgrees) {
+        wrong.add(fmt::format("{} ({:.2f} Hz)", name, *ledger->board_rate_hz));
+      }
+    }
+    if (!wrong.empty())
+      problem("sample rate",
+              fmt::format("the board's is not the {:.3f} Hz of campaign.toml: {}",
+                          data_.info.daq.sample_rate_hz, wrong.text()),
+              "set daq.sample_rate_hz; frequencies and times are off by as much");
+  }
+
+ private:
+  double lowest_calibrated_N() const {
+    double lowest = 0;
+    if (data_.certificate) {
+      for (const CellFit& cell : data_.certificate->cells) lowest = std::max(lowest, cell.lowest_force_N);
+    }
+    return lowest;
+  }
+
+  const CampaignFile& file_;
+  const CampaignData& data_;
+};
+
+}  // namespace
+
+std::vector<Finding> fitness(const CampaignFile& file, const CampaignData& data) {
+  Fitness checks(file, data);
+  checks.calibration();
+  checks.tares();
+  checks.geometry();
+  checks.channels();
+  checks.metadata();
+  checks.speeds();
+  checks.drifts();
+  checks.thrusts();
+  checks.rates();
+  return checks.take();
+}
+
+}  // namespace tunnelrig
