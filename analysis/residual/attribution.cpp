@@ -49,7 +49,8 @@ StructureLeft Search::run_on_top_of(const Attribution& found) {
   const std::size_t before = result_.curves.size();
   while (static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve(scan_curves()))
     for (std::size_t t = 0; t < result_.accepted.size(); ++t)
-      if (outshone_by_curve(result_.accepted[t].term)) left.bent.insert(t);
+      if (!result_.accepted[t].term.per_group && outshone_by_curve(result_.accepted[t].term))
+        left.bent.insert(t);
   smooth_curves(before);
   left.curves = {result_.curves.begin() + static_cast<std::ptrdiff_t>(before), result_.curves.end()};
   left.fit = std::move(fit_);
