@@ -1,7 +1,7 @@
 #include "analysis/residual/condition_scatter.h"
 
 #include "analysis/residual/alike.h"
-#include "analysis/residual/curves.h"
+#include "analysis/residual/condition_values.h"
 #include "analysis/residual/run_correlation.h"
 
 #include <algorithm>

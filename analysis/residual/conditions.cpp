@@ -1,4 +1,5 @@
 // What the conditions of the runs cannot show.
+#include "analysis/residual/condition_values.h"
 #include "analysis/residual/explanation_parts.h"
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // Structure without a name.
+#include "analysis/residual/condition_values.h"
 #include "analysis/residual/null_maxima.h"
 #include "analysis/residual/search.h"
 
