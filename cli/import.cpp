@@ -6,6 +6,7 @@
 #include "datasets/error.h"
 #include "datasets/observations.h"
 #include "datasets/rcbenchmark.h"
+#include "datasets/unit_doubts.h"
 
 #include <chrono>
 #include <memory>
@@ -103,6 +104,7 @@ int import_rows(const ImportVerbOptions& options) {
   const ObservationTable table = read_rows(options);
   const TableParts parts = check_table(table);
   store_table(table, options.db, options.replace);
+  for (const std::string& doubt : unit_doubts(table).sentences) warn(doubt);
   print_rows(options, table, parts);
   if (options.format == "rcbenchmark" && !table.schema.speed_column)
     warn(

@@ -3,6 +3,7 @@
 #include "datasets/locations.h"
 #include "datasets/plausible.h"
 #include "datasets/run_columns.h"
+#include "datasets/unit_doubts.h"
 
 #include <algorithm>
 #include <cmath>
@@ -82,7 +83,12 @@ std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& ru
   Doubts doubts = info.unread;
   doubt_columns(runs_sheet, runs, doubts);
   doubt_labels(runs_sheet, runs, doubts);
-  doubt_thrusts(info, runs_sheet, runs, doubts);
+  const UnitDoubts units = unit_doubts(runs_sheet, runs);
+  doubts.insert(doubts.end(), units.sentences.begin(), units.sentences.end());
+  const bool cause_said = std::any_of(units.columns.begin(), units.columns.end(), [](const auto& column) {
+    return column.starts_with("thrust_") || column == "speed_rpm";
+  });
+  if (!cause_said) doubt_thrusts(info, runs_sheet, runs, doubts);
   doubt_places(runs_sheet, runs, doubts);
   return doubts;
 }

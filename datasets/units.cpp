@@ -1,6 +1,7 @@
 #include "datasets/units.h"
 
 #include "datasets/error.h"
+#include "datasets/unit_list.h"
 
 #include <algorithm>
 #include <array>
@@ -111,6 +112,8 @@ constexpr std::array<Unit, 94> kUnits = {{
 }};
 
 }  // namespace
+
+std::span<const Unit> known_units() { return kUnits; }
 
 const Unit& unit_from_name(std::string_view name) {
   const auto* found =

@@ -90,5 +90,31 @@ TEST_F(UnitMistakes, ATableWhoseDiameterIsInAnotherUnit) {
   EXPECT_THAT(inches.error, HasSubstr("is less than any propeller's"));
 }
 
+/// A doubt is a warning: what was written is stored.
+TEST_F(UnitMistakes, ASessionInAnotherUnit) {
+  test::ExampleCampaign campaign;
+  campaign.runs_csv.replace(campaign.runs_csv.find(",18.0\n"), 6, ",68.5\n");
+  campaign.runs_csv += "R4,OS,2,S3,2026-03-04T08:00:00Z,raw/R3.npy,,,5000.5,19.0\n";
+  campaign.write(folder / "source");
+  const ProgramResult imported = run("import source --db c.db");
+  EXPECT_EQ(imported.code, 0);
+  EXPECT_EQ(imported.error,
+            "warning: runs.csv:4, column air_temperature_C: session S2 has 68.5, all others 19 to 20.7; from "
+            "degF these would be 20.3: another unit?\n");
+}
+
+TEST_F(UnitMistakes, ABlockOfATableInAnotherUnit) {
+  write_text(folder / "t.csv", "day,N,CT\n1,5000,0.1\n2,5010,0.1\n3,83.4,0.1\n4,4990,0.1\n");
+  write_text(folder / "t.toml",
+             "format = \"tunnelrig-table/1\"\nblocks = \"day\"\n[response]\ncolumn = \"CT\"\n"
+             "meaning = \"c_t\"\n[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n");
+  const ProgramResult imported = run("import t.csv --format table --schema t.toml --db t.db");
+  EXPECT_EQ(imported.code, 0);
+  EXPECT_EQ(imported.error,
+            "warning: t.csv:4, column N: day 3 has 83.4, all others 4990 to 5010; from rev/s these would be "
+            "5004: another unit?\n");
+  EXPECT_THAT(imported.out, HasSubstr("t.db: 4 observations"));
+}
+
 }  // namespace
 }  // namespace tunnelrig
