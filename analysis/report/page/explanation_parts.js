@@ -132,8 +132,11 @@ const timesText = (times) => times ?
 
 const unknownText = (unknown, unit) => {
   const {covariate, place, times, rotor, amplitude, p_value: p, instead_of: insteadOf = []} = unknown;
+  const bySealed = unknown.by_sealed_too ?
+      ' The blocks that were not sealed are too few to show it, so it is in no error, and is not adopted as a curve.' :
+      '';
   const where = `${rotor ? ` at rotor ${rotor}` : ''}${placeText(place)}${timesText(times)}`;
   return `Depends on \`${covariate}\`${where}: amplitude ${digits(amplitude)}${
-      unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${labelsText(unknown, unit)}${
+      unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${bySealed}${labelsText(unknown, unit)}${
       insteadOf.length ? ` It bends away from the formula of ${insteadOf.join(', ')}.` : ''}`;
 };
