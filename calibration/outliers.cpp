@@ -1,5 +1,6 @@
 #include "calibration/outliers.h"
 
+#include "calibration/deletions.h"
 #include "calibration/distributions.h"
 #include "calibration/regression.h"
 
@@ -9,6 +10,8 @@
 #include <numeric>
 #include <optional>
 #include <random>
+#include <span>
+#include <utility>
 
 #include <Eigen/QR>
 
@@ -17,6 +20,7 @@ namespace {
 
 using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 using Rows = std::vector<Eigen::Index>;
+using RemovedRows = std::span<const Eigen::Index>;
 
 // With a quarter of the rows gross, every one of 150 draws of 8 rows holds such a row with p = (1 −
 // 0.75⁸)¹⁵⁰, 2e-7.
@@ -33,14 +37,18 @@ std::optional<Eigen::VectorXd> solve_rows(const Eigen::MatrixXd& X, const Eigen:
   return qr.solve(y(rows));
 }
 
-/// Rows by the size of their residuals, smallest first.
-Rows by_residual(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& coefficients) {
+/// The `count` rows with the smallest residuals, smallest first and the first of equals first.
+Rows nearest(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& coefficients,
+             Eigen::Index count) {
   const Eigen::VectorXd distance = (y - X * coefficients).cwiseAbs();
-  Rows order(static_cast<std::size_t>(X.rows()));
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](Eigen::Index a, Eigen::Index b) { return distance[a] < distance[b]; });
-  return order;
+  // beside their rows, and only as many as are asked for: sorting is most of the time of a robust fit
+  std::vector<std::pair<double, Eigen::Index>> order;
+  for (Eigen::Index row = 0; row < X.rows(); ++row) order.emplace_back(distance[row], row);
+  std::nth_element(order.begin(), order.begin() + count, order.end());
+  std::sort(order.begin(), order.begin() + count);
+  Rows rows;
+  for (Eigen::Index i = 0; i < count; ++i) rows.push_back(order[static_cast<std::size_t>(i)].second);
+  return rows;
 }
 
 /// Orders of rows whose first few determine the coefficients: every set of p rows where they are few, random
@@ -85,102 +93,88 @@ Rows independent_rows(const Eigen::MatrixXd& X, const Rows& order) {
   return chosen;
 }
 
-/// A set of rows taken out, and the fit of the rest.
-struct Deletion {
-  Rows rows;
-  std::optional<Regression> rest;
-
-  Deletion(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, Rows removed) : rows(std::move(removed)) {
-    Mask keep = Mask::Constant(X.rows(), true);
-    for (const Eigen::Index row : rows) keep[row] = false;
-    rest = regress(rows_where(X, keep), rows_where(y, keep));
-  }
-
-  double rest_sum() const { return rest ? rest->residual_sum : std::numeric_limits<double>::infinity(); }
-};
-
-/// Test of the rows against one deletion.
+/// Test of the rows against the fit of the rest without some of them.
 class Tester {
  public:
-  Tester(const Eigen::MatrixXd& X, const Eigen::VectorXd& y)
-      : X_(X), y_(y), all_(*regress(X, y)), least_variance_(std::pow(rounding_floor(y), 2)) {}
+  Tester(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Regression& all)
+      : X_(X), y_(y), all_sum_(all.residual_sum), least_variance_(std::pow(rounding_floor(y), 2)) {}
 
-  /// P of the joint mean-shift F test, times the number of sets of that size.
-  double joint_p(const Deletion& deletion) const {
-    const auto k = static_cast<double>(deletion.rows.size());
-    const int dof = deletion.rest->dof;
-    const double excess = (all_.residual_sum - deletion.rest->residual_sum) / k;
-    const double f = excess / std::max(deletion.rest->variance(), least_variance_);
-    return f_upper_p(std::max(f, 0.0), k, dof) * std::exp(log_binomial(static_cast<double>(X_.rows()), k));
-  }
-
-  std::vector<RowTest> rows(const Deletion& deletion) const {
-    const Regression& rest = *deletion.rest;
+  std::vector<RowTest> rows(const RemovedRows& removed, const RestFit& rest) const {
     std::vector<RowTest> tests(static_cast<std::size_t>(X_.rows()));
+    for (const Eigen::Index row : removed) tests[static_cast<std::size_t>(row)].gross = true;
     for (Eigen::Index i = 0; i < X_.rows(); ++i) {
-      const bool removed = std::find(deletion.rows.begin(), deletion.rows.end(), i) != deletion.rows.end();
-      const double h = X_.row(i) * rest.inverse_normal * X_.row(i).transpose();
-      const double residual = y_[i] - X_.row(i) * rest.coefficients;
       RowTest& test = tests[static_cast<std::size_t>(i)];
-      test.leverage = removed ? h / (1 + h) : std::min(h, 1.0);
-      test.gross = removed;
+      const double h = leverage(rest, i);
+      const double residual = y_[i] - X_.row(i) * rest.coefficients;
+      test.leverage = test.gross ? h / (1 + h) : std::min(h, 1.0);
       // a removed row is out of the rest's scatter already, another one is taken out of it here
-      const double spread = removed ? 1 + h : 1 - h;
-      const int dof = removed ? rest.dof : rest.dof - 1;
+      const double spread = test.gross ? 1 + h : 1 - h;
+      const int dof = test.gross ? rest.dof : rest.dof - 1;
       if (dof < 1 || spread < 1e-10) continue;
-      const double sum = removed ? rest.residual_sum : rest.residual_sum - residual * residual / spread;
-      const double variance = std::max(sum / dof, least_variance_);
-      test.studentised = residual / std::sqrt(variance * spread);
-      test.p = std::min(1.0, static_cast<double>(X_.rows()) * student_t_two_sided_p(test.studentised, dof));
+      const double sum = test.gross ? rest.residual_sum : rest.residual_sum - residual * residual / spread;
+      test.studentised = residual / std::sqrt(std::max(sum / dof, least_variance_) * spread);
+      test.p = row_p(test.studentised, dof);
     }
     return tests;
   }
 
   /// Whether the set as a whole and each of its members is gross.
-  bool keeps(const GrossRule& rule, const Deletion& deletion) const {
-    if (!deletion.rest || joint_p(deletion) > rule.p) return false;
-    const auto tests = rows(deletion);
-    const Eigen::VectorXd fitted = X_ * deletion.rest->coefficients;
-    const double least = rule.share_of_span * (fitted.maxCoeff() - fitted.minCoeff());
-    return std::all_of(deletion.rows.begin(), deletion.rows.end(), [&](Eigen::Index row) {
-      return tests[static_cast<std::size_t>(row)].p <= rule.p && std::abs(y_[row] - fitted[row]) >= least;
-    });
-  }
-
-  /// The row whose deletion residual is largest among those that `deletion` leaves.
-  Eigen::Index most_extreme(const Deletion& deletion) const {
-    const auto tests = rows(deletion);
-    const auto size_of = [](const RowTest& test) { return test.gross ? -1.0 : std::abs(test.studentised); };
-    const auto found = std::max_element(tests.begin(), tests.end(), [&](const RowTest& a, const RowTest& b) {
-      return size_of(a) < size_of(b);
-    });
-    return found - tests.begin();
+  bool keeps(const GrossRule& rule, const RemovedRows& removed, const RestFit& rest) const {
+    if (rest.dof < 1 || joint_p(removed, rest) > rule.p) return false;
+    // all members are tested with one scatter: the least of them decides
+    double least = std::numeric_limits<double>::infinity(), least_studentised = least;
+    for (const Eigen::Index row : removed) {
+      const double size = std::abs(y_[row] - X_.row(row) * rest.coefficients);
+      least = std::min(least, size);
+      least_studentised = std::min(least_studentised, size / std::sqrt(1 + leverage(rest, row)));
+    }
+    least_studentised /= std::sqrt(std::max(rest.variance(), least_variance_));
+    if (row_p(least_studentised, rest.dof) > rule.p) return false;
+    const Eigen::VectorXd fitted = X_ * rest.coefficients;
+    return least >= rule.share_of_span * (fitted.maxCoeff() - fitted.minCoeff());
   }
 
  private:
+  double leverage(const RestFit& rest, Eigen::Index row) const {
+    return X_.row(row) * rest.inverse_normal * X_.row(row).transpose();
+  }
+
+  /// P of the joint mean-shift F test, times the number of sets of that size.
+  double joint_p(const RemovedRows& removed, const RestFit& rest) const {
+    const auto k = static_cast<double>(removed.size());
+    const double excess = (all_sum_ - rest.residual_sum) / k;
+    const double f = excess / std::max(rest.variance(), least_variance_);
+    return f_upper_p(std::max(f, 0.0), k, rest.dof) *
+           std::exp(log_binomial(static_cast<double>(X_.rows()), k));
+  }
+
+  double row_p(double studentised, int dof) const {
+    return std::min(1.0, static_cast<double>(X_.rows()) * student_t_two_sided_p(studentised, dof));
+  }
+
   const Eigen::MatrixXd& X_;
   const Eigen::VectorXd& y_;
-  Regression all_;
+  double all_sum_;
   double least_variance_;
 };
 
-/// Candidate sets of 1 to `largest` rows: the stepwise one and the robust one of each size, whichever leaves
-/// less scatter.
-std::vector<Deletion> candidate_sets(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Tester& tester,
-                                     Eigen::Index largest) {
-  const Rows robust = by_residual(X, y, least_trimmed_squares(X, y));
-  std::vector<Deletion> sets;
-  Deletion stepwise(X, y, {});
-  for (Eigen::Index size = 1; size <= largest; ++size) {
-    Deletion trimmed(X, y, Rows(robust.end() - size, robust.end()));
-    if (stepwise.rest) {
-      Rows grown = stepwise.rows;
-      grown.push_back(tester.most_extreme(stepwise));
-      stepwise = Deletion(X, y, std::move(grown));
-    }
-    sets.push_back(stepwise.rest_sum() < trimmed.rest_sum() ? stepwise : std::move(trimmed));
+/// The largest gross set. Of each size up to `largest` there are two candidates, the farthest from a robust
+/// fit and those of stepwise deletion: whichever leaves less scatter is tested.
+Rows gross_rows(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const GrossRule& rule,
+                const Tester& tester, Eigen::Index largest) {
+  Rows farthest_first = nearest(X, y, least_trimmed_squares(X, y), X.rows());
+  std::reverse(farthest_first.begin(), farthest_first.end());
+  const Removal trimmed = remove_in_order(X, y, farthest_first, largest);
+  const Removal stepwise = remove_stepwise(X, y, largest);
+  for (auto size = static_cast<std::size_t>(largest); size > 0; --size) {
+    const RestFit *of_trimmed = trimmed.without(size), *of_stepwise = stepwise.without(size);
+    const bool step = of_stepwise && (!of_trimmed || of_stepwise->residual_sum < of_trimmed->residual_sum);
+    const RestFit* rest = step ? of_stepwise : of_trimmed;
+    if (!rest) continue;
+    const RemovedRows removed((step ? stepwise : trimmed).order.data(), size);
+    if (tester.keeps(rule, removed, *rest)) return {removed.begin(), removed.end()};
   }
-  return sets;
+  return {};
 }
 
 }  // namespace
@@ -188,18 +182,15 @@ std::vector<Deletion> candidate_sets(const Eigen::MatrixXd& X, const Eigen::Vect
 Eigen::VectorXd least_trimmed_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {
   const Eigen::VectorXd scale = X.colwise().norm();
   const Eigen::MatrixXd scaled = X * scale.cwiseInverse().asDiagonal();
-  const auto half = static_cast<std::ptrdiff_t>((X.rows() + X.cols() + 1) / 2);
-  const auto concentrated = [&](const Eigen::VectorXd& start) {
-    const Rows order = by_residual(scaled, y, start);
-    return Rows(order.begin(), order.begin() + half);
-  };
+  const Eigen::Index half = (X.rows() + X.cols() + 1) / 2;
   Eigen::VectorXd best = scaled.colPivHouseholderQr().solve(y);
   double least = std::numeric_limits<double>::infinity();
   for (const Rows& order : starting_orders(X.rows(), X.cols())) {
     auto found = solve_rows(scaled, y, independent_rows(scaled, order));
-    for (int step = 0; found && step < 2; ++step) found = solve_rows(scaled, y, concentrated(*found));
+    for (int step = 0; found && step < 2; ++step)
+      found = solve_rows(scaled, y, nearest(scaled, y, *found, half));
     if (!found) continue;
-    const Rows kept = concentrated(*found);
+    const Rows kept = nearest(scaled, y, *found, half);
     const double sum = (y(kept) - scaled(kept, Eigen::all) * *found).squaredNorm();
     if (sum < least) {
       least = sum;
@@ -218,13 +209,14 @@ std::vector<RowTest> test_rows(const Eigen::MatrixXd& X, const Eigen::VectorXd& 
     }
     return untested;
   }
-  const Tester tester(X, y);
+  const Tester tester(X, y, *all);
   const Eigen::Index largest =
       std::min((X.rows() - X.cols() - 1) / 2, std::max<Eigen::Index>(1, X.rows() / 4));
-  const auto sets = candidate_sets(X, y, tester, largest);
-  const auto gross =
-      std::find_if(sets.rbegin(), sets.rend(), [&](const Deletion& set) { return tester.keeps(rule, set); });
-  return tester.rows(gross == sets.rend() ? Deletion(X, y, {}) : *gross);
+  const Rows gross = gross_rows(X, y, rule, tester, largest);
+  Mask keep = Mask::Constant(X.rows(), true);
+  for (const Eigen::Index row : gross) keep[row] = false;
+  const auto rest = regress(rows_where(X, keep), rows_where(y, keep));
+  return rest ? tester.rows(gross, RestFit(*rest)) : tester.rows({}, RestFit(*all));
 }
 
 }  // namespace tunnelrig
