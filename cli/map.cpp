@@ -52,7 +52,16 @@ void print(const WrittenMaps& written) {
              written.files.size(), written.files.empty() ? "" : written.files[0].parent_path().string());
 }
 
+/// Before anything is reduced and fitted.
+void check_nodes(int nodes) {
+  if (nodes >= 3 && nodes <= kMostNodes && nodes % 2 == 1) return;
+  throw InputError(fmt::format(
+      "--nodes {}: an odd number from 3 to {}, so that a node is at OT and the maps fit into memory", nodes,
+      kMostNodes));
+}
+
 int run_map(const MapOptions& options) {
+  check_nodes(options.nodes);
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   const CampaignData data = read_campaign_data(file);
   const Reduction reduction = reduce_by(data, choose_model(file, options.model, options.terms));
@@ -121,7 +130,9 @@ void add_map(CLI::App& app, Work& work) {
   verb->add_option("--out", options->out, "Folder for the files")->required();
   verb->add_option("--method", options->method, "gaussian-process or thin-plate-spline")
       ->capture_default_str();
-  verb->add_option("--nodes", options->nodes, "Of the grid along each side, odd")->capture_default_str();
+  verb->add_option("--nodes", options->nodes,
+                   fmt::format("Of the grid along each side, odd, at most {}", kMostNodes))
+      ->capture_default_str();
   add_model_options(*verb, options->model, options->terms);
   verb->add_flag("--json", options->json, "Print the summary as JSON");
   verb->callback([options, &work] { work = [options] { return run_map(*options); }; });

@@ -197,12 +197,19 @@ std::vector<PlannedRun> parse_plan(const Sheet& sheet) {
 std::vector<PlannedLocation> parse_locations(const Sheet& sheet) {
   sheet.require("location");
   std::vector<PlannedLocation> locations;
+  std::map<std::string, int> lines;  // of the locations by their canonical labels
   for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
     PlannedLocation location{sheet.text(row, "location"), coordinate(sheet, row, "y_norm"),
                              coordinate(sheet, row, "z_norm")};
     if (location.label.empty())
       throw InputError(fmt::format("{}: must not be empty", sheet.where(row, "location")));
     check_both_or_neither(sheet, row, location.y_norm, location.z_norm);
+    const auto [first, is_new] = lines.emplace(canonical_location(location.label), sheet.rows[row].line);
+    if (!is_new) {  // its runs would be planned twice, which no plan may
+      throw InputError(
+          fmt::format("{}: '{}' is a location of line {} already; --repeats says how many runs each gets",
+                      sheet.where(row, "location"), location.label, first->second));
+    }
     locations.push_back(location);
   }
   if (locations.empty()) throw InputError::in(sheet.file, "names no location");

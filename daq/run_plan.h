@@ -53,7 +53,7 @@ Sheet plan_sheet(const std::vector<PlannedRun>& plan);
 std::vector<PlannedRun> parse_plan(const Sheet& sheet);
 
 /// A user's own locations: a CSV with `location` and, where the label is not of the thesis's grid, `y_norm`
-/// and `z_norm`.
+/// and `z_norm`. Throws InputError naming file, line and column, and for a location named twice.
 std::vector<PlannedLocation> parse_locations(const Sheet& sheet);
 
 }  // namespace tunnelrig

@@ -59,8 +59,9 @@ std::vector<LeftOut> leave_one_out(const FittedField& field) {
 }
 
 MapGrid regular_grid(int nodes) {
-  if (nodes < 3 || nodes % 2 == 0) {
-    throw InputError(fmt::format("a grid of {} nodes a side: the number must be odd and at least 3", nodes));
+  if (nodes < 3 || nodes > kMostNodes || nodes % 2 == 0) {
+    throw InputError(
+        fmt::format("a grid of {} nodes a side: the number must be odd, from 3 to {}", nodes, kMostNodes));
   }
   std::vector<double> axis(static_cast<std::size_t>(nodes));
   for (int i = 0; i < nodes; ++i) axis[static_cast<std::size_t>(i)] = (2.0 * i - (nodes - 1)) / (nodes - 1);

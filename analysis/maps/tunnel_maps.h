@@ -44,8 +44,11 @@ FieldEstimate estimate_at(const FittedField& field, const TunnelPoint& point);
 /// How well each location is predicted by the others.
 std::vector<LeftOut> leave_one_out(const FittedField& field);
 
-/// A regular grid over [−1, 1]²; `nodes` along each side, odd and at least 3, so that it holds (0, 0).
-/// Throws InputError for another number.
+/// Along each side of a grid, 0.004 apart: time and memory go with the square.
+constexpr int kMostNodes = 501;
+
+/// A regular grid over [−1, 1]²; `nodes` along each side, odd and from 3 to kMostNodes, so that it holds
+/// (0, 0). Throws InputError for another number.
 MapGrid regular_grid(int nodes);
 
 /// The field on a grid, rounded to 10⁻⁶ percentage points; never −0.

@@ -115,6 +115,16 @@ TEST_F(BadInput, OptionsAndFilesThatAreNotThere) {
   EXPECT_THAT(refusal_of("log --db c.db --plan none.csv", {}), HasSubstr("none.csv: cannot be read"));
 }
 
+TEST_F(BadInput, MoreOfAMapOrAPlanThanThereCanBe) {
+  for (const char* nodes : {"100000", "503", "40", "1", "-3"}) {
+    EXPECT_THAT(refusal_of(std::string("map --db none.db --out maps --nodes ") + nodes, {}),
+                HasSubstr(std::string("--nodes ") + nodes + ": an odd number from 3 to 501"));
+  }
+  std::ofstream(folder / "l.csv") << "location\nOT\nH4V-2\nH4V-2\n";
+  EXPECT_THAT(refusal_of("plan --locations l.csv --out plan.csv", {"l.csv"}),
+              HasSubstr("l.csv:4: column location: 'H4V-2' is a location of line 3 already"));
+}
+
 TEST_F(BadInput, AReportOfNothingAndFiguresThatNoPaperHas) {
   EXPECT_THAT(refusal_of("report --db c.db", {}),
               HasSubstr("--out FILE (the page), --figures FOLDER, or both"));

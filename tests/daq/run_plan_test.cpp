@@ -101,6 +101,11 @@ TEST(Plan, NamesWhatIsWrong) {
   EXPECT_THAT(message_of([&] { make_plan(one_visit); }), HasSubstr("--visits 1"));
   EXPECT_THAT(message_of([] { parse_locations(parse_csv("location,y_norm\nX,0.5\n", "l.csv")); }),
               HasSubstr("one of y_norm and z_norm"));
+  EXPECT_THAT(message_of([] { parse_locations(parse_csv("location\nOT\nH4V-2\nOT\n", "l.csv")); }),
+              HasSubstr("l.csv:4: column location: 'OT' is a location of line 2 already"));
+  EXPECT_THAT(message_of([] { parse_locations(parse_csv("location\nOT\nH0V0\n", "l.csv")); }),
+              HasSubstr("l.csv:3: column location: 'H0V0' is a location of line 2 already"))
+      << "one place by two names";
 }
 
 /// What no run sheet can hold would make the whole campaign file unreadable.

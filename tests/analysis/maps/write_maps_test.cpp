@@ -58,7 +58,7 @@ TEST(WriteMaps, TheGridIsTheCallers) {
   settings.nodes = 3;
   write_maps(folder.path(), example(), settings);
   EXPECT_EQ(read_csv(folder / "delta_ct.csv").rows.size(), 9u);
-  for (const int nodes : {40, 1, -3}) {
+  for (const int nodes : {40, 1, -3, 503, 100001}) {
     settings.nodes = nodes;
     EXPECT_THAT(message_of([&] { write_maps(folder.path(), example(), settings); }),
                 HasSubstr("must be odd"));
