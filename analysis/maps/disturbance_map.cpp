@@ -16,6 +16,8 @@ using json = nlohmann::ordered_json;  // keeps the order of keys, the provenance
 
 constexpr const char* kFormat = "tunnelrig-map/1";
 constexpr std::uint64_t kMostLocations = 1'000'000;
+constexpr double kSameNode = 1e-9;             // of coordinates that another program's rounding moved
+constexpr double kRoundingOfSymmetry = 0.002;  // percentage points, of values that were rounded to 0.001
 
 /// A value of the document that knows where it stands, so that every message can name its key.
 class Node {
@@ -144,6 +146,40 @@ void check_origin(const Node& document, const MapGrid& grid, const MapLayer& del
   };
   const double value = delta_ct.value_percent[grid.index(zero_of(grid.z_norm), zero_of(grid.y_norm))];
   if (value != 0) document["delta_ct_percent"].fail("must be 0 at y_norm = z_norm = 0, is {}", value);
+}
+
+/// A rotor does not pull down: C_T is not negative, nor is either pair's share of the sum.
+void check_thrusts(const Node& document, const DisturbanceMap& map) {
+  for (const double value : map.delta_ct.value_percent) {
+    if (value < -100) document["delta_ct_percent"].fail("must not be below -100 %, holds {}", value);
+  }
+  for (const double value : map.uneven_thrust.value_percent) {
+    if (std::abs(value) > 100)
+      document["uneven_thrust_percent"].fail("must be from -100 to 100 %, holds {}", value);
+  }
+}
+
+/// Flight takes the right half and mirrors it; a left half that says something else would be passed over.
+void check_symmetry(const Node& layer, const std::vector<double>& values, const MapGrid& grid, double sign) {
+  const std::vector<double>& y = grid.y_norm;
+  for (std::size_t column = 0; column < y.size() && y[column] < kSameNode; ++column) {
+    const auto image =
+        static_cast<std::size_t>(std::lower_bound(y.begin(), y.end(), -y[column] - kSameNode) - y.begin());
+    if (image == y.size() || y[image] > -y[column] + kSameNode) continue;
+    for (std::size_t row = 0; row < grid.z_norm.size(); ++row) {
+      const double here = values[grid.index(row, column)], there = values[grid.index(row, image)];
+      if (std::abs(here - sign * there) <= kRoundingOfSymmetry) continue;
+      layer.items()[row].items()[column].fail("must be {} in y_norm, is {} at {} and {} at {}",
+                                              sign < 0 ? "odd" : "even", here, y[column], there, y[image]);
+    }
+  }
+}
+
+std::string parse_method(const Node& node) {
+  std::string method = node.text();
+  if (method != "gaussian-process" && method != "thin-plate-spline")
+    node.fail("must be 'gaussian-process' or 'thin-plate-spline', is '{}'", method);
+  return method;
 }
 
 double parse_coordinate(const Node& node) {
@@ -276,9 +312,12 @@ DisturbanceMap parse_disturbance_map(std::string_view text, const std::string& f
   map.delta_ct = parse_layer(document, "delta_ct", map.grid);
   map.uneven_thrust = parse_layer(document, "uneven_thrust", map.grid);
   check_origin(document, map.grid, map.delta_ct);
+  check_thrusts(document, map);
+  check_symmetry(document["delta_ct_percent"], map.delta_ct.value_percent, map.grid, 1);
+  check_symmetry(document["uneven_thrust_percent"], map.uneven_thrust.value_percent, map.grid, -1);
   for (const Node& location : document["locations"].items())
     map.locations.push_back(parse_location(location));
-  map.method = document["method"].text();
+  map.method = parse_method(document["method"]);
   map.coverage_factor = document["coverage_factor"].positive();
   const Node reference = document["reference"];
   map.c_t_origin = reference["c_t_origin"].positive();

@@ -5,6 +5,8 @@
 #include "published_input.h"
 #include "support/temporary_folder.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -115,6 +117,55 @@ TEST(DisturbanceMap, NamesTheGridThatIsWrong) {
   map.delta_ct.value_percent[map.grid.index(2, 2)] = 0.1;
   EXPECT_THAT(message_of([&] { parse_disturbance_map(format_disturbance_map(map), "m.json"); }),
               HasSubstr("the key delta_ct_percent must be 0 at y_norm = z_norm = 0, is 0.1"));
+}
+
+/// The message for the example with one value of a layer replaced.
+std::string refusal_of_value(MapLayer DisturbanceMap::*layer, std::size_t row, std::size_t column,
+                             double value) {
+  DisturbanceMap map = example();
+  (map.*layer).value_percent[map.grid.index(row, column)] = value;
+  return message_of([&] { parse_disturbance_map(format_disturbance_map(map), "m.json"); });
+}
+
+TEST(DisturbanceMap, NamesTheMethodThatIsNone) {
+  EXPECT_THAT(
+      refusal("\"gaussian-process\"", "\"kriging\""),
+      HasSubstr("m.json: the key method must be 'gaussian-process' or 'thin-plate-spline', is 'kriging'"));
+}
+
+TEST(DisturbanceMap, NamesTheThrustThatNoRotorHas) {
+  EXPECT_THAT(refusal_of_value(&DisturbanceMap::uneven_thrust, 1, 3, 500),
+              HasSubstr("m.json: the key uneven_thrust_percent must be from -100 to 100 %, holds 500"));
+  EXPECT_THAT(refusal_of_value(&DisturbanceMap::delta_ct, 1, 3, -101),
+              HasSubstr("m.json: the key delta_ct_percent must not be below -100 %, holds -101"));
+}
+
+TEST(DisturbanceMap, NamesTheNodeThatIsNotTheMirrorImage) {
+  EXPECT_THAT(refusal_of_value(&DisturbanceMap::uneven_thrust, 1, 3, 7.5),
+              HasSubstr("m.json: the key uneven_thrust_percent[1][1] must be odd in y_norm, is "));
+  EXPECT_THAT(
+      refusal_of_value(&DisturbanceMap::uneven_thrust, 4, 2, 0.3),
+      HasSubstr("the key uneven_thrust_percent[4][2] must be odd in y_norm, is 0.3 at 0 and 0.3 at 0"));
+  EXPECT_THAT(refusal_of_value(&DisturbanceMap::delta_ct, 0, 4, 50),
+              HasSubstr("the key delta_ct_percent[0][0] must be even in y_norm, is "));
+  DisturbanceMap rounded = example();  // another program's: to 0.001, and a column without a mirror image
+  for (MapLayer* layer : {&rounded.delta_ct, &rounded.uneven_thrust}) {
+    for (double& value : layer->value_percent) value = std::floor(1000 * value) / 1000;
+  }
+  rounded.grid.y_norm[1] = -0.7;
+  EXPECT_NO_THROW(parse_disturbance_map(format_disturbance_map(rounded), "m.json"));
+}
+
+TEST(DisturbanceMap, WhatMapWritesIsRead) {
+  for (const MapMethod method : {MapMethod::kGaussianProcess, MapMethod::kThinPlateSpline}) {
+    for (const unsigned seed : {1U, 2U, 3U}) {
+      const TunnelMaps maps = fit_maps(test::published_input(seed), {.method = method});
+      for (const int nodes : {3, 7, 41}) {
+        const std::string text = format_disturbance_map(disturbance_map(maps, nodes, "{}"));
+        EXPECT_NO_THROW(parse_disturbance_map(text, "m.json")) << nodes << " nodes";
+      }
+    }
+  }
 }
 
 TEST(DisturbanceMap, IsReadFromAFile) {
