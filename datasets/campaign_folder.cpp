@@ -253,12 +253,19 @@ class NpySink : public FrameSink {
   std::vector<Gap> gaps_;
 };
 
+/// The two columns that there must be, and of those that there may be the ones that say something: what came
+/// with two goes with two.
 Sheet gap_sheet(const std::vector<Gap>& gaps) {
-  Sheet sheet{.file = "", .columns = {"first_frame", "frames_lost", "cause", "estimated"}, .rows = {}};
+  Sheet sheet{.file = "", .columns = {"first_frame", "frames_lost"}, .rows = {}};
+  const bool causes = std::ranges::any_of(gaps, [](const Gap& gap) { return !gap.cause.empty(); });
+  const bool estimates = std::ranges::any_of(gaps, [](const Gap& gap) { return gap.estimated; });
+  if (causes) sheet.columns.emplace_back("cause");
+  if (estimates) sheet.columns.emplace_back("estimated");
   for (const Gap& gap : gaps) {
-    sheet.rows.push_back({{fmt::format("{}", gap.first_frame), fmt::format("{}", gap.frames_lost), gap.cause,
-                           gap.estimated ? "1" : "0"},
-                          0});
+    std::vector<std::string> cells{fmt::format("{}", gap.first_frame), fmt::format("{}", gap.frames_lost)};
+    if (causes) cells.push_back(gap.cause);
+    if (estimates) cells.emplace_back(gap.estimated ? "1" : "0");
+    sheet.rows.push_back({std::move(cells), 0});
   }
   return sheet;
 }

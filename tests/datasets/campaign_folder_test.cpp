@@ -83,6 +83,24 @@ TEST_F(Folder, ExportGivesBackEveryByte) {
   EXPECT_EQ(contents(folder / "out"), contents(source));
 }
 
+TEST_F(Folder, GapsComeBackWithTheColumnsThatTheyHad) {
+  for (const char* gaps :
+       {"first_frame,frames_lost\n10,3\n400,2\n", "first_frame,frames_lost,cause\n10,3,lost\n400,2,\n",
+        "first_frame,frames_lost,estimated\n10,3,0\n400,2,1\n"}) {
+    campaign.write(source);
+    write_text(source / "raw/R2.gaps.csv", gaps);
+    import_campaign_folder(source, db, options());
+    const fs::path out = folder / "out", again = folder / "again.db";
+    export_campaign_folder(CampaignFile(db, CampaignFile::Access::kRead), out, {});
+    EXPECT_EQ(read_text(out / "raw/R2.gaps.csv"), gaps);
+    import_campaign_folder(out, again, options());
+    fs::remove_all(out);
+    export_campaign_folder(CampaignFile(again, CampaignFile::Access::kRead), out, {});
+    EXPECT_EQ(contents(out), contents(source));
+    for (const fs::path& path : {source, db, out, again}) fs::remove_all(path);
+  }
+}
+
 class FolderTypes : public Folder, public testing::WithParamInterface<SampleType> {};
 
 TEST_P(FolderTypes, ArraysKeepTypeAndValues) {
