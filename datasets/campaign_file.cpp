@@ -105,6 +105,16 @@ bool has_no_journal(const std::filesystem::path& path) {
   return !std::filesystem::exists(journal, error) || std::filesystem::file_size(journal, error) == 0;
 }
 
+/// Whoever reads a journal shares an index of it with the others, which SQLite makes beside the file.
+void check_journal_can_be_read(const std::filesystem::path& path) {
+  std::error_code error;
+  if (has_no_journal(path) || std::filesystem::exists(with_suffix(path, "-shm"), error)) return;
+  throw InputError::in(path.string(),
+                       "its newest rows are in {} still, which cannot be read in a folder that is read-only; "
+                       "copy both to one that is not",
+                       with_suffix(path, "-wal").filename().string());
+}
+
 /// SQLite would make a journal beside a file even to read it, which a reader without rights cannot; a file
 /// without one, that this reader cannot change, is read as it is.
 std::string unchanging(const std::filesystem::path& path) {
@@ -155,6 +165,7 @@ CampaignFile::CampaignFile(const std::filesystem::path& path, Access access) : p
   const int flags = access == Access::kRecord              ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE
                     : access == Access::kWrite || writable ? SQLITE_OPEN_READWRITE
                                                            : SQLITE_OPEN_READONLY;
+  if (flags == SQLITE_OPEN_READONLY) check_journal_can_be_read(path);
   database_ = flags == SQLITE_OPEN_READONLY && has_no_journal(path)
                   ? std::make_unique<Database>(unchanging(path), flags | SQLITE_OPEN_URI)
                   : std::make_unique<Database>(path.string(), flags);

@@ -6,6 +6,7 @@
 #include "support/temporary_folder.h"
 
 #include <fstream>
+#include <iostream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -98,6 +99,36 @@ TEST(CampaignFile, RefusesWhatIsNoCampaign) {
   }
   EXPECT_THAT(message_of([&] { CampaignFile(folder / "new.db", Access::kRead); }),
               HasSubstr("schema version 99"));
+}
+
+/// As a user without rights, who may be the one that runs the test: says on stderr what opening gives.
+[[noreturn]] void read_without_rights(const std::filesystem::path& path) {
+  constexpr uid_t kNobody = 65534;
+  if (::geteuid() == 0 && ::setuid(kNobody) != 0) std::_Exit(9);
+  std::cerr << message_of([&] { CampaignFile(path, Access::kRead).info(); }) << '\n';
+  std::_Exit(0);
+}
+
+TEST(CampaignFile, InAReadOnlyFolderSaysThatItsJournalCannotBeRead) {
+  const test::TemporaryFolder folder;
+  const auto killed = folder / "killed", whole = folder / "whole";
+  for (const auto& copy : {killed, whole}) std::filesystem::create_directory(copy);
+  {
+    CampaignFile file(folder / "c.db", Access::kRecord);
+    file.set_text("campaign.toml", reference_campaign_toml());
+    std::filesystem::copy(folder / "c.db", killed / "c.db");
+    std::filesystem::copy(folder / "c.db-wal", killed / "c.db-wal");
+  }
+  std::filesystem::copy(folder / "c.db", whole / "c.db");
+  using std::filesystem::perms;
+  std::filesystem::permissions(folder.path(), perms{0755});
+  for (const auto& copy : {killed, whole}) std::filesystem::permissions(copy, perms{0555});
+  const testing::ExitedWithCode well(0);
+  EXPECT_EXIT(
+      read_without_rights(killed / "c.db"), well,
+      "c.db: its newest rows are in c.db-wal still, which cannot be read in a folder that is read-only");
+  EXPECT_EXIT(read_without_rights(whole / "c.db"), well, "no InputError was thrown");
+  for (const auto& copy : {killed, whole}) std::filesystem::permissions(copy, perms::owner_all);
 }
 
 TEST(CampaignFile, MigratesFromOlderVersionsWithoutLosingRows) {
