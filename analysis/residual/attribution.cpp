@@ -46,8 +46,11 @@ StructureLeft Search::run_on_top_of(const Attribution& found) {
   StructureLeft left;
   for (std::size_t t = 0; t < result_.accepted.size(); ++t)
     if (bends_away(t)) left.bent.insert(t);
+  // Of single rows the seal leaves plenty, and what `hold_out` declares is not to be seen by any search.
+  const bool few = !observations_.blocks_are_rows && observations_.held_out.empty();
   const std::size_t before = result_.curves.size();
-  while (static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve(scan_curves()))
+  while (few && static_cast<int>(result_.curves.size()) < settings_.most_curves &&
+         add_best_curve(scan_curves()))
     for (std::size_t t = 0; t < result_.accepted.size(); ++t)
       if (!result_.accepted[t].term.per_group && outshone_by_curve(result_.accepted[t].term))
         left.bent.insert(t);
