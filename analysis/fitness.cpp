@@ -193,7 +193,12 @@ class Fitness : public Findings {
   }
 
   void thrusts() {
-    if (const auto doubt = implausible_thrust(data_)) problem("thrusts", doubt->found, doubt->advice);
+    const auto doubt = implausible_thrust(data_);
+    if (!doubt) return;
+    if (doubt->too_much)
+      problem("thrusts", doubt->found, doubt->advice);
+    else
+      note("thrusts", doubt->found, doubt->advice);
   }
 
   void rates() {

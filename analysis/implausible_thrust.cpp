@@ -99,7 +99,8 @@ std::optional<ImplausibleThrust> implausible_thrust(const CampaignData& data, co
       fmt::format(
           "{} are rig.propeller_radius_m (no diameter) and rig.nominal_speed_rpm of campaign.toml right?",
           too_much ? "are the calibration's loads, its propeller tests or the thrusts in grams?"
-                   : "are the calibration's loads or the thrusts in kilograms, its readings in mV?")};
+                   : "are the calibration's loads or the thrusts in kilograms, its readings in mV?"),
+      too_much};
 }
 
 std::optional<ImplausibleThrust> implausible_thrust(const CampaignData& data) {
@@ -113,6 +114,7 @@ std::optional<ImplausibleThrust> implausible_thrust(const CampaignData& data) {
 std::optional<ImplausibleThrust> implausible_thrust(const TableReduction& reduction) {
   const double most = kMostRotorCoefficient, least = kLeastOverMostThrust * kMostRotorCoefficient;
   std::size_t beyond = 0;
+  bool any_too_much = false;
   std::string first;
   for (const TableGroup& group : reduction.groups) {
     double largest = 0;
@@ -120,6 +122,7 @@ std::optional<ImplausibleThrust> implausible_thrust(const TableReduction& reduct
     const bool too_much = std::abs(of_one_rotor(group.median, reduction.convention)) > most;
     const bool too_little = of_one_rotor(largest, reduction.convention) < least;
     if (!too_much && !too_little) continue;
+    any_too_much |= too_much;
     const double per_thesis = of_one_rotor(1, reduction.convention);
     if (++beyond == 1)
       first = fmt::format("group {}: {} C_T of {:.3g} is {} than any propeller's ({:.2g} at {})", group.name,
@@ -130,7 +133,7 @@ std::optional<ImplausibleThrust> implausible_thrust(const TableReduction& reduct
   if (beyond == 0) return {};
   return ImplausibleThrust{
       fmt::format("{}; so in {} of {} groups", first, beyond, reduction.groups.size()),
-      "are thrust, speed and propeller diameter in the units that the schema gives them?"};
+      "are thrust, speed and propeller diameter in the units that the schema gives them?", any_too_much};
 }
 
 }  // namespace tunnelrig

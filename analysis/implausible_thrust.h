@@ -13,6 +13,7 @@ namespace tunnelrig {
 struct ImplausibleThrust {
   std::string found;   // place, value and rule
   std::string advice;  // what is likely wrong
+  bool too_much;       // a mistake for certain; too little may be a rig at rest
 };
 
 /// Too much is said of any rotor at any location, by its mean thrust there. Too little is said only where

@@ -77,9 +77,10 @@ void print_summary(const CampaignData& data, const Reduction& reduction, const S
   for (const std::string& note : summary.notes) fmt::print("note: {}\n", note);
 }
 
+/// True where it is a mistake for certain.
 bool warn_of(const std::optional<ImplausibleThrust>& doubt) {
   if (doubt) warn(fmt::format("{}: {}", doubt->found, doubt->advice));
-  return doubt.has_value();
+  return doubt && doubt->too_much;
 }
 
 /// Says what was left out, and what cannot be. True where that needs mending.
