@@ -127,12 +127,6 @@ std::string refusal_of_value(MapLayer DisturbanceMap::*layer, std::size_t row, s
   return message_of([&] { parse_disturbance_map(format_disturbance_map(map), "m.json"); });
 }
 
-TEST(DisturbanceMap, NamesTheMethodThatIsNone) {
-  EXPECT_THAT(
-      refusal("\"gaussian-process\"", "\"kriging\""),
-      HasSubstr("m.json: the key method must be 'gaussian-process' or 'thin-plate-spline', is 'kriging'"));
-}
-
 TEST(DisturbanceMap, NamesTheThrustThatNoRotorHas) {
   EXPECT_THAT(refusal_of_value(&DisturbanceMap::uneven_thrust, 1, 3, 500),
               HasSubstr("m.json: the key uneven_thrust_percent must be from -100 to 100 %, holds 500"));
