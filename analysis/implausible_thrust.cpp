@@ -1,6 +1,7 @@
 #include "analysis/implausible_thrust.h"
 
 #include "analysis/conventions.h"
+#include "analysis/residual/upper_median.h"
 #include "datasets/error.h"
 #include "datasets/locations.h"
 #include "datasets/plausible.h"
@@ -10,6 +11,8 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 namespace tunnelrig {
 namespace {
@@ -66,9 +69,7 @@ LargestThrust largest_of(const std::map<std::string, RotorsOfLocation>& location
 double median_of_speeds(const Reduction& reduction) {
   std::vector<double> speeds;
   for (const RunCoefficients& run : reduction.runs) speeds.push_back(run.speed_rpm);
-  const auto middle = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() / 2);
-  std::nth_element(speeds.begin(), middle, speeds.end());
-  return *middle;
+  return upper_median(std::move(speeds));
 }
 
 double of_one_rotor(double c_t, Convention convention) {

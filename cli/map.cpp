@@ -54,7 +54,7 @@ void print(const WrittenMaps& written) {
 
 /// Before anything is reduced and fitted.
 void check_nodes(int nodes) {
-  if (nodes >= 3 && nodes <= kMostNodes && nodes % 2 == 1) return;
+  if (is_grid_size(nodes)) return;
   throw InputError(fmt::format(
       "--nodes {}: an odd number from 3 to {}, so that a node is at OT and the maps fit into memory", nodes,
       kMostNodes));

@@ -59,7 +59,7 @@ std::vector<LeftOut> leave_one_out(const FittedField& field) {
 }
 
 MapGrid regular_grid(int nodes) {
-  if (nodes < 3 || nodes > kMostNodes || nodes % 2 == 0) {
+  if (!is_grid_size(nodes)) {
     throw InputError(
         fmt::format("a grid of {} nodes a side: the number must be odd, from 3 to {}", nodes, kMostNodes));
   }

@@ -47,8 +47,10 @@ std::vector<LeftOut> leave_one_out(const FittedField& field);
 /// Along each side of a grid, 0.004 apart: time and memory go with the square.
 constexpr int kMostNodes = 501;
 
-/// A regular grid over [−1, 1]²; `nodes` along each side, odd and from 3 to kMostNodes, so that it holds
-/// (0, 0). Throws InputError for another number.
+/// An odd number from 3 to kMostNodes: one node is at (0, 0).
+constexpr bool is_grid_size(int nodes) { return nodes >= 3 && nodes <= kMostNodes && nodes % 2 == 1; }
+
+/// A regular grid over [−1, 1]²; `nodes` along each side. Throws InputError where that is no grid size.
 MapGrid regular_grid(int nodes);
 
 /// The field on a grid, rounded to 10⁻⁶ percentage points; never −0.

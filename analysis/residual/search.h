@@ -126,6 +126,9 @@ class Search {
   /// the runs is none. Nothing of few runs, whose signs make too few data sets.
   std::vector<Eigen::MatrixXd> sizes_beside(const JointFit& fit, const Candidate& candidate,
                                             const CandidateFit& found) const;
+  /// What chance makes of a scan on top of a fit, whose best candidate counts as no scatter. Refers to
+  /// `scan`.
+  NullMaxima maxima_of(const JointFit& fit, const Scan& scan, std::uint64_t salt) const;
 
   // what runs scatter like: search_scatter.cpp
   /// Whether runs, rotors or locations scatter unlike each other, or neighbouring runs resemble each other,

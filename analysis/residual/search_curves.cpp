@@ -52,8 +52,7 @@ bool Search::add_best_curve(const CurveScan& curves) {
   const auto& [scan, tried] = curves;
   if (tried.empty()) return false;
   const std::size_t best = scan.order[0];
-  NullMaxima maxima(*scan.scan, fit_.variances, sizes_beside(fit_, scan.candidates[best], scan.fits[best]),
-                    settings_, 1000 + ++salt_);
+  NullMaxima maxima = maxima_of(fit_, scan, 1000 + ++salt_);
   const double p = maxima.p(scan.fits[best].evidence);
   Round round;
   round.observed = scan.fits[best].evidence;
@@ -132,10 +131,7 @@ void Search::drop_what_a_curve_replaces() {
 bool Search::is_still_found(const Term& term, const JointFit& without) {
   const Scan scan = scan_effects(without);
   if (scan.order.empty()) return false;
-  const std::size_t best = scan.order[0];
-  NullMaxima maxima(*scan.scan, without.variances,
-                    sizes_beside(without, scan.candidates[best], scan.fits[best]), settings_, 4000 + ++salt_);
-  return maxima.p(evidence_of(scan, term)) <= settings_.alpha;
+  return maxima_of(without, scan, 4000 + ++salt_).p(evidence_of(scan, term)) <= settings_.alpha;
 }
 
 void Search::drop(std::size_t t, const JointFit& without) {
@@ -220,10 +216,7 @@ bool Search::bends_away(std::size_t t) {
   if (bends.tried.empty()) return false;
   rank(fit_, bends.scan);
   const std::size_t best = bends.scan.order[0];
-  NullMaxima maxima(*bends.scan.scan, fit_.variances,
-                    sizes_beside(fit_, bends.scan.candidates[best], bends.scan.fits[best]), settings_,
-                    5000 + ++salt_);
-  const double p = maxima.p(bends.scan.fits[best].evidence);
+  const double p = maxima_of(fit_, bends.scan, 5000 + ++salt_).p(bends.scan.fits[best].evidence);
   if (p > settings_.alpha / 2) return false;  // one question of each name, not the largest of many
   const JointFit without = fit_;
   add_curve(bends.tried[best], p);

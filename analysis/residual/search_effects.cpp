@@ -100,9 +100,7 @@ bool Search::add_best_effect() {
   const Scan scan = scan_effects_and_groups(fit_);
   Round round;
   if (scan.order.empty()) return false;
-  const std::size_t best = scan.order[0];
-  NullMaxima maxima(*scan.scan, fit_.variances, sizes_beside(fit_, scan.candidates[best], scan.fits[best]),
-                    settings_, ++salt_);
+  NullMaxima maxima = maxima_of(fit_, scan, ++salt_);
   const double p = maxima.p(scan.fits[scan.order[0]].evidence);
   if (p <= settings_.alpha || critical_ == 0) critical_ = maxima.critical();
   round.observed = scan.fits[scan.order[0]].evidence;
@@ -124,6 +122,12 @@ std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Can
   const Components residual = without(difference(y_, fit.linear.offset), candidate.columns, found.amplitude);
   std::mt19937_64 random(settings_.seed * 1000003 + 6000);
   return mixed_->sizes_left(fit.variances.ratio, fit.variances.sigma, residual, candidate.columns, random);
+}
+
+NullMaxima Search::maxima_of(const JointFit& fit, const Scan& scan, std::uint64_t salt) const {
+  const std::size_t best = scan.order[0];
+  return {*scan.scan, fit.variances, sizes_beside(fit, scan.candidates[best], scan.fits[best]), settings_,
+          salt};
 }
 
 std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const {
@@ -259,8 +263,7 @@ void Search::swap_weaker() {
       fit_ = current;
       continue;
     }
-    NullMaxima maxima(*scan.scan, without.variances,
-                      sizes_beside(without, scan.candidates[best], scan.fits[best]), settings_, ++salt_);
+    NullMaxima maxima = maxima_of(without, scan, ++salt_);
     const auto rmse_of = [&](const JointFit& fit) {
       return cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns,
                             fit.variances, rows_)
