@@ -17,12 +17,12 @@ using test::explained;
 using testing::Contains;
 using testing::HasSubstr;
 
-constexpr double kRunSigma = 0.002;
+constexpr double kCalmSigma = 0.002;
 
 struct ConditionScatter : testing::Test {
   std::mt19937_64 random{test::seed()};
 
-  Observations observations() { return test::four_rotors(8, kRunSigma, random); }
+  Observations observations() { return test::four_rotors(8, kCalmSigma, random); }
 
   /// Of each run, over the calmest: 1 without wind, `times` at the most of it.
   static VectorXd gusts(const Observations& o, double times) {
@@ -34,7 +34,7 @@ struct ConditionScatter : testing::Test {
     MatrixXd y = o.y;
     for (Index row = 0; row < y.rows(); ++row)
       for (Index c = 0; c < y.cols(); ++c)
-        y(row, c) += kRunSigma * std::sqrt(times(row) * times(row) - 1) * normal(random);
+        y(row, c) += kCalmSigma * std::sqrt(times(row) * times(row) - 1) * normal(random);
     test::set_y(o, y);
   }
 
@@ -73,7 +73,7 @@ TEST_F(ConditionScatter, HeavyTailsAreNone) {
     Observations o = observations();
     std::student_t_distribution<double> heavy(3);
     const MatrixXd y =
-        o.y + MatrixXd::NullaryExpr(o.rows(), 4, [&] { return 2 * kRunSigma * heavy(random); });
+        o.y + MatrixXd::NullaryExpr(o.rows(), 4, [&] { return 2 * kCalmSigma * heavy(random); });
     test::set_y(o, y);
     differ += found(o).names.empty() ? 0 : 1;
   }
