@@ -46,7 +46,8 @@ int import_folder(const ImportVerbOptions& options) {
                                       {"raw_runs", summary.raw_runs},
                                       {"frames", summary.frames},
                                       {"raw_bytes", summary.raw_bytes},
-                                      {"seconds", seconds}}
+                                      {"seconds", seconds},
+                                      {"doubts", summary.doubts}}
                            .dump(1));
   } else {
     fmt::print("{}: {} runs, {} with raw data, {} frames, {:.1f} MB at {:.0f} MB/s\n", options.db,
@@ -78,7 +79,8 @@ std::string in_words(const TableColumn& column) {
          (column.meaning.empty() ? "" : " as " + column.meaning);
 }
 
-void print_rows(const ImportVerbOptions& options, const ObservationTable& table, const TableParts& parts) {
+void print_rows(const ImportVerbOptions& options, const ObservationTable& table, const TableParts& parts,
+                const std::vector<std::string>& doubts) {
   if (options.json) {
     nlohmann::ordered_json json{{"db", options.db},
                                 {"observations", table.rows.size()},
@@ -88,6 +90,7 @@ void print_rows(const ImportVerbOptions& options, const ObservationTable& table,
                                 {"covariates", nlohmann::ordered_json::array()}};
     for (const TableColumn& column : table.schema.covariates)
       json["covariates"].push_back(column_json(column));
+    json["doubts"] = doubts;
     fmt::print("{}\n", json.dump(1));
     return;
   }
@@ -104,12 +107,13 @@ int import_rows(const ImportVerbOptions& options) {
   const ObservationTable table = read_rows(options);
   const TableParts parts = check_table(table);
   store_table(table, options.db, options.replace);
-  for (const std::string& doubt : unit_doubts(table).sentences) warn(doubt);
-  print_rows(options, table, parts);
+  std::vector<std::string> doubts = unit_doubts(table).sentences;
   if (options.format == "rcbenchmark" && !table.schema.speed_column)
-    warn(
+    doubts.push_back(
         "no column Motor Optical Speed or Motor Electrical Speed has a value: thrust without speed gives no "
         "C_T");
+  for (const std::string& doubt : doubts) warn(doubt);
+  print_rows(options, table, parts, doubts);
   return kWell;
 }
 

@@ -38,6 +38,7 @@ Attribution Search::run() {
 
 StructureLeft Search::run_on_top_of(const Attribution& found) {
   make_models();
+  list_ways();
   result_.accepted = found.accepted;
   result_.curves = found.curves;
   fit_ = fit_jointly(observations_, found.final.model, rows_);
@@ -49,11 +50,14 @@ StructureLeft Search::run_on_top_of(const Attribution& found) {
   // Of single rows the seal leaves plenty, and what `hold_out` declares is not to be seen by any search.
   const bool few = !observations_.blocks_are_rows && observations_.held_out.empty();
   const std::size_t before = result_.curves.size();
-  while (few && static_cast<int>(result_.curves.size()) < settings_.most_curves &&
-         add_best_curve(scan_curves()))
+  while (few && static_cast<int>(result_.curves.size()) < settings_.most_curves) {
+    const JointFit without = fit_;
+    if (!add_best_curve(scan_curves())) break;
     for (std::size_t t = 0; t < result_.accepted.size(); ++t)
       if (!result_.accepted[t].term.per_group && outshone_by_curve(result_.accepted[t].term))
         left.bent.insert(t);
+    name_newest_curve(without);
+  }
   smooth_curves(before);
   left.curves = {result_.curves.begin() + static_cast<std::ptrdiff_t>(before), result_.curves.end()};
   left.fit = std::move(fit_);
@@ -66,6 +70,20 @@ void Search::begin() {
   observations_ = given_;
   observations_.scatter = std::move(scatter);
   make_models();
+  list_ways();
+  result_ = {};
+  result_.baseline = fit_jointly(observations_, {}, rows_);
+  fit_ = result_.baseline;
+  result_.detectable_sigma = detectable_by_one(*mixed_, fit_.variances, settings_.alpha);
+  critical_ = 0;
+}
+
+void Search::make_models() {
+  mixed_ = std::make_unique<MixedModel>(observations_, rows_);
+  baseline_ = std::make_unique<MixedModel>(MixedModel::baseline_alone(observations_, rows_));
+}
+
+void Search::list_ways() {
   ways_ = all_ways(effects_, observations_, rows_);
   const OwnEvidence has_evidence(observations_, *baseline_);
   const auto taken_back = [&](const Term& way) {
@@ -77,16 +95,6 @@ void Search::begin() {
   std::erase_if(ways_, [&](const Term& way) { return taken_back(way) || !has_evidence(way); });
   points_.clear();
   for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
-  result_ = {};
-  result_.baseline = fit_jointly(observations_, {}, rows_);
-  fit_ = result_.baseline;
-  result_.detectable_sigma = detectable_by_one(*mixed_, fit_.variances, settings_.alpha);
-  critical_ = 0;
-}
-
-void Search::make_models() {
-  mixed_ = std::make_unique<MixedModel>(observations_, rows_);
-  baseline_ = std::make_unique<MixedModel>(MixedModel::baseline_alone(observations_, rows_));
 }
 
 OwnEvidence::OwnEvidence(const Observations& observations, const MixedModel& baseline)
@@ -140,8 +148,8 @@ Attribution attribute(const Observations& observations, const std::vector<int>& 
 }
 
 StructureLeft structure_left(const Attribution& found, const std::vector<int>& rows,
-                             const SearchSettings& settings) {
-  return Search(found.observations, rows, {}, settings).run_on_top_of(found);
+                             const std::vector<const Effect*>& effects, const SearchSettings& settings) {
+  return Search(found.observations, rows, effects, settings).run_on_top_of(found);
 }
 
 }  // namespace tunnelrig

@@ -54,6 +54,7 @@ struct FoundCurve {
   Curve curve;
   double p = 1;
   std::vector<std::string> instead_of;  // effects that were in, until the curve showed their formulas wrong
+  std::vector<Term> could_be = {};      // of StructureLeft: one way of each effect that does as well
 };
 
 struct Attribution {
@@ -106,8 +107,9 @@ struct StructureLeft {
   std::vector<Round> rounds;   // of the search
   std::set<std::size_t> bent;  // of `accepted`: what its covariate does bends away from its formula
 };
-/// `found` speaks of its own observations, which must outlive the call.
+/// `found` speaks of its own observations, which must outlive the call. `effects`: what the structure could
+/// be.
 StructureLeft structure_left(const Attribution& found, const std::vector<int>& rows,
-                             const SearchSettings& settings);
+                             const std::vector<const Effect*>& effects, const SearchSettings& settings);
 
 }  // namespace tunnelrig

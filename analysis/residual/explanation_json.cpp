@@ -52,6 +52,10 @@ Json unknown_json(const UnknownStructure& unknown) {
   Json shape = Json::array();
   for (const ShapePoint& point : unknown.shape)
     shape.push_back({finite(point.x), finite(point.y), finite(point.low), finite(point.high)});
+  Json could_be = Json::array();
+  for (const CouldBe& name : unknown.could_be)
+    could_be.push_back(
+        {{"effect", name.effect}, {"rotor", rotor_json(name.rotor)}, {"at_theory", name.at_theory}});
   return {{"covariate", unknown.covariate},
           {"covariate_unit", unknown.covariate_unit},
           {"place", unknown.place.empty() ? Json(nullptr) : Json(unknown.place)},
@@ -62,7 +66,8 @@ Json unknown_json(const UnknownStructure& unknown) {
           {"shape", shape},
           {"labels", unknown.labels},
           {"instead_of", unknown.instead_of},
-          {"by_sealed_too", unknown.by_sealed_too}};
+          {"by_sealed_too", unknown.by_sealed_too},
+          {"could_be", could_be}};
 }
 
 }  // namespace

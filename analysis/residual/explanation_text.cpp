@@ -87,6 +87,15 @@ std::string in_words(const AdoptedEffect& a) {
   return text;
 }
 
+std::string could_be_in_words(const UnknownStructure& u) {
+  std::vector<std::string> names;
+  for (const CouldBe& name : u.could_be)
+    names.push_back(name.effect + (name.rotor < 0 ? "" : fmt::format(" of rotor {}", name.rotor + 1)) +
+                    (name.at_theory ? " at theory's coefficient" : ""));
+  return fmt::format("{} would do as well, and could not be scored any more: more sessions would tell",
+                     fmt::join(names, ", or "));
+}
+
 std::string in_words(const UnknownStructure& u, const std::string& unit) {
   const bool plain = u.covariate_unit.empty() || u.covariate_unit == "1";
   std::string text =
@@ -101,6 +110,7 @@ std::string in_words(const UnknownStructure& u, const std::string& unit) {
   if (u.by_sealed_too)
     text +=
         "    only with the sealed blocks in: the others are too few to show it, so it is not in the errors\n";
+  if (!u.could_be.empty()) text += wrapped("  " + could_be_in_words(u));
   if (!u.instead_of.empty())
     text += fmt::format("    in which it bends away from the formula of {}\n", fmt::join(u.instead_of, ", "));
   return text;

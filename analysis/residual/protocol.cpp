@@ -289,6 +289,8 @@ void report_structure_left(const StructureLeft& left, const Observations& observ
   for (const FoundCurve& curve : left.curves) {
     explanation.unknown.push_back(describe(observations, left.fit, curve, rows));
     explanation.unknown.back().by_sealed_too = true;
+    for (const Term& term : curve.could_be)
+      explanation.unknown.back().could_be.push_back({term.effect->name, term.rotor, term.at_theory});
     explanation.by_sealed_too.push_back(curve.curve);
   }
   for (Round round : left.rounds) {
@@ -297,7 +299,8 @@ void report_structure_left(const StructureLeft& left, const Observations& observ
   }
 }
 
-void estimate_on_all(const Models& models, const Observations& observations, const SearchSettings& settings,
+void estimate_on_all(const Models& models, const Observations& observations,
+                     const std::vector<const Effect*>& effects, const SearchSettings& settings,
                      Explanation& explanation) {
   const auto& [wide, alone, found] = models;
   const std::vector<int> rows = observations.all_rows();
@@ -321,7 +324,7 @@ void estimate_on_all(const Models& models, const Observations& observations, con
   warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);
   for (const FoundCurve& curve : found.curves)
     explanation.unknown.push_back(describe(wide, whole, curve, rows));
-  report_structure_left(structure_left(found, rows, settings), wide, rows, explanation);
+  report_structure_left(structure_left(found, rows, effects, settings), wide, rows, explanation);
   if (found.session_unknown && explanation.unknown.empty())
     explanation.unknown.push_back(
         describe_sessions(observations, fitted.error, *found.session_unknown, rows));
@@ -367,7 +370,7 @@ Explanation explain_once(const Observations& observations, const std::vector<con
   const Models models{found.observations, alone, found};
   open_seal(models, seal, settings, explanation);
   settings.progress("estimating parameters");
-  estimate_on_all(models, observations, settings, explanation);
+  estimate_on_all(models, observations, effects, settings, explanation);
   warn_of_companions(found.observations, effects, explanation);
   explanation.verdict = verdict_of(explanation);
   return explanation;

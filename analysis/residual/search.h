@@ -43,6 +43,8 @@ class Search {
   void begin();
   /// Those of `observations_`.
   void make_models();
+  /// The effects in all their ways, but for those taken back and those that the data cannot show.
+  void list_ways();
 
   // named effects: search_effects.cpp
   void add_effects();
@@ -194,6 +196,10 @@ class Search {
   /// baseline.
   static bool within_bounds(const Scan& scan, std::size_t i);
   std::vector<Ranked> rivals_in_groups(const Accepted& accepted) const;
+  /// Effects that step 3 would accept in the newest curve's place, and that predict unseen blocks about as
+  /// well. `without`: the fit without the curve.
+  void name_newest_curve(const JointFit& without);
+  CrossValidation unseen(const JointFit& fit, const NullFit& variances) const;
 
   const Observations& given_;
   Observations observations_;  // a group's own amplitudes become a part of its baseline

@@ -148,10 +148,6 @@ std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const 
 
 bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round) {
   std::vector<const Effect*> refused;
-  const auto unseen = [this](const JointFit& fit, const NullFit& variances) {
-    return cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns, variances,
-                          rows_);
-  };
   const CrossValidation before = unseen(fit_, fit_.variances);
   for (const std::size_t best : scan.order) {
     if (scan.fits[best].evidence < critical_) break;
@@ -196,6 +192,11 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
     return true;
   }
   return false;
+}
+
+CrossValidation Search::unseen(const JointFit& fit, const NullFit& variances) const {
+  return cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns, variances,
+                        rows_);
 }
 
 std::optional<std::string> Search::why_not(const JointFit& fit, const CrossValidation& after,
@@ -264,11 +265,7 @@ void Search::swap_weaker() {
       continue;
     }
     NullMaxima maxima = maxima_of(without, scan, ++salt_);
-    const auto rmse_of = [&](const JointFit& fit) {
-      return cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns,
-                            fit.variances, rows_)
-          .rmse();
-    };
+    const auto rmse_of = [this](const JointFit& fit) { return unseen(fit, fit.variances).rmse(); };
     fit_ = std::move(tried);
     const auto place = result_.accepted.begin() + static_cast<std::ptrdiff_t>(t);
     std::rotate(place, place + 1, result_.accepted.end());  // the new term is the model's last

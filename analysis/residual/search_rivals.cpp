@@ -1,10 +1,13 @@
 // Effects that do as well as an accepted one.
 #include "analysis/residual/group_amplitudes.h"
+#include "analysis/residual/null_maxima.h"
 #include "analysis/residual/search.h"
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <set>
+#include <utility>
 
 namespace tunnelrig {
 
@@ -97,8 +100,7 @@ std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
   fewer.beyond = without_column(observations_.beyond, own_place);
   const JointFit without = fit_without(t, fewer);
   const Eigen::MatrixXd predicted = predict_response(observations_, {}, rows_);
-  const Components y = difference(y_, fit_.linear.offset);
-  const CrossValidation own = cross_validate(observations_, y, fit_.linear.columns, fit_.variances, rows_);
+  const CrossValidation own = unseen(fit_, fit_.variances);
   for (const Term& way : ways_) {
     const std::string cause = way.effect->cause();
     const bool taken = already_in(way, fit_.model) ||
@@ -121,6 +123,28 @@ std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
       result.push_back({.term = way});
   }
   return result;
+}
+
+void Search::name_newest_curve(const JointFit& without) {
+  FoundCurve newest = std::move(result_.curves.back());
+  result_.curves.pop_back();
+  const JointFit with_curve = std::exchange(fit_, without);
+  const Scan scan = scan_effects(fit_);
+  const double critical = scan.order.empty() ? 0 : maxima_of(fit_, scan, 6000 + ++salt_).critical();
+  const CrossValidation of_curve = unseen(with_curve, with_curve.variances);
+  std::set<std::string> tried;
+  for (const std::size_t i : scan.order) {
+    if (scan.fits[i].evidence < critical) break;
+    if (!tried.insert(scan.ways[i].effect->cause()).second) continue;
+    const JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
+    const CrossValidation after = unseen(fit, fit.variances);
+    if (why_not(fit, after, compare(unseen(fit_, fit.variances), after)) ||
+        compare(unseen(fit, with_curve.variances), of_curve).told_apart())
+      continue;
+    newest.could_be.push_back(fit.model.terms.back());
+  }
+  fit_ = with_curve;
+  result_.curves.push_back(std::move(newest));
 }
 
 }  // namespace tunnelrig

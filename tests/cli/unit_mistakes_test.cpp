@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 #include <gtest/gtest.h>
 
 namespace tunnelrig {
@@ -52,6 +53,8 @@ TEST_F(UnitMistakes, ACalibrationInGrams) {
   const ProgramResult imported = import_with_forces_times(1000 / 9.80665);
   EXPECT_EQ(imported.code, 0);
   EXPECT_THAT(imported.error, HasSubstr("are these newtons (not grams)?"));
+  const auto for_machines = nlohmann::json::parse(run("import source --db c.db --replace --json").out);
+  EXPECT_THAT(for_machines["doubts"].dump(), HasSubstr("are these newtons (not grams)?"));
   EXPECT_THAT(run("calibrate --db c.db").out, AllOf(HasSubstr("Warnings"), HasSubstr("(not grams)?")));
   const ProgramResult reduced = run("reduce --db c.db");
   EXPECT_EQ(reduced.code, 1);

@@ -135,8 +135,14 @@ const unknownText = (unknown, unit) => {
   const bySealed = unknown.by_sealed_too ?
       ' The blocks that were not sealed are too few to show it, so it is in no error, and is not adopted as a curve.' :
       '';
+  const couldBe = (unknown.could_be ?? []).map(
+      (name) => `${name.effect}${name.rotor ? ` at rotor ${name.rotor}` : ''}${
+          name.at_theory ? ' at theory’s coefficient' : ''}`);
+  const names = couldBe.length ?
+      ` ${couldBe.join(', or ')} would do as well, and could not be scored any more: more sessions would tell.` :
+      '';
   const where = `${rotor ? ` at rotor ${rotor}` : ''}${placeText(place)}${timesText(times)}`;
   return `Depends on \`${covariate}\`${where}: amplitude ${digits(amplitude)}${
-      unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${bySealed}${labelsText(unknown, unit)}${
+      unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${bySealed}${names}${labelsText(unknown, unit)}${
       insteadOf.length ? ` It bends away from the formula of ${insteadOf.join(', ')}.` : ''}`;
 };

@@ -188,78 +188,6 @@ TEST_F(ExplainTest, StructureWithoutANameIsUnknown) {
   EXPECT_EQ(both.adopted[0].term.effect->name, "supply_voltage");
   expect_contract(both);
 }
-
-/// What varies with the session is seen in few values, of which the seal takes a quarter.
-TEST_F(ExplainTest, StructureThatOnlyAllBlocksShowIsUnknownAndNotScored) {
-  int of_all = 0, of_open = 0;
-  for (int campaign = 0; campaign < 12; ++campaign) {
-    Observations o = test::simulate(
-        {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .session_ratio = 0.3}, random);
-    test::add_covariate(o, "hall_heating_kW", 0, 30, random);
-    Eigen::MatrixXd& heating = o.covariates.back().value;
-    for (Eigen::Index r = 0; r < o.rows(); ++r) heating(r, 0) = heating(8 * (r / 8), 0);
-    test::set_y(o, o.y + 0.0013 * (heating.array() / 30 * 6.28).cos().matrix().replicate(1, 4));
-    const Explanation e = explained(o);
-    if (e.unknown.empty() || e.unknown[0].covariate != "hall_heating_kW") continue;
-    if (!e.unknown[0].by_sealed_too) {
-      ++of_open;
-      continue;
-    }
-    ++of_all;
-    EXPECT_EQ(e.by_sealed_too.size(), e.unknown.size());
-    EXPECT_TRUE(e.model.curves.empty());
-    EXPECT_NEAR(e.unknown[0].amplitude, 0.0013 * 7, 0.6 * 0.0022 * 7);
-    EXPECT_EQ(e.after.held_out_rmse, e.before.held_out_rmse);
-    EXPECT_THAT(explanation_text(e), HasSubstr("only with the sealed blocks in"));
-    expect_contract(e);
-  }
-  EXPECT_GE(of_all, 1) << "and the open blocks alone " << of_open;
-}
-
-/// What a rotor does above a temperature and not below is half a line: few sessions do not show its other
-/// half, all of them do.
-TEST_F(ExplainTest, AFormulaThatItsOwnConditionBendsAwayFromIsTakenBack) {
-  int taken_back = 0, named = 0, of_line = 0;
-  const auto campaign = [&](bool kink) {
-    Observations o = test::simulate(
-        {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .session_ratio = 0.3}, random);
-    test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
-    Eigen::MatrixXd& supply = o.covariates.back().value;
-    for (Eigen::Index r = 0; r < o.rows(); ++r) supply(r, 0) = supply(8 * (r / 8), 0);
-    const Eigen::ArrayXd over = supply.array() - 16;
-    Eigen::MatrixXd y = o.y;
-    y.colwise() += 0.004 * (kink ? 2 * over.max(0) : over).matrix();
-    test::set_y(o, y);
-    return explained(o);
-  };
-  for (int number = 0; number < 12; ++number) {
-    const Explanation e = campaign(true);
-    if (!e.adopted.empty()) ++named;
-    if (testing::Value(e.warnings, Contains(HasSubstr("supply_voltage_V bends away from its formula")))) {
-      ++taken_back;
-      EXPECT_EQ(e.verdict, "unknown") << explanation_text(e);
-      EXPECT_EQ(e.unknown.at(0).covariate, "supply_voltage_V");
-    }
-    if (number % 3 == 0) of_line += campaign(false).adopted.size() == 1;
-  }
-  EXPECT_GE(taken_back, 1);
-  EXPECT_LE(named, 8);
-  EXPECT_GE(of_line, 3) << "of 4: what follows the formula keeps its name";
-}
-
-TEST_F(ExplainTest, AllBlocksShowNothingWhereNothingIs) {
-  int unknown = 0;
-  for (int campaign = 0; campaign < 30; ++campaign) {
-    Observations o =
-        test::simulate({.runs_of_block = std::vector<int>(16, 6), .channels = 4, .session_ratio = 1}, random);
-    for (const char* name : {"hall_heating_kW", "cable_slack_mm"})
-      test::add_covariate(o, name, 0, 30, random);
-    if (!explained(o).unknown.empty()) ++unknown;
-  }
-  EXPECT_LE(unknown, 4) << "two tests at 2 %: beyond 4 of 30 once in a hundred at 4 %";
-}
-
-/// A switch, or a few settings: nothing lies between them, and no wave or bend sees them.
 TEST_F(ExplainTest, SessionsThatDifferByFarMoreThanTheirRunsAreUnknown) {
   const auto with = [&](double session_ratio) {
     return explained(test::simulate(
@@ -279,6 +207,7 @@ TEST_F(ExplainTest, SessionsThatDifferByFarMoreThanTheirRunsAreUnknown) {
   expect_contract(e);
 }
 
+/// A switch, or a few settings: nothing lies between them, and no wave or bend sees them.
 TEST_F(ExplainTest, FewValuesAreHeldAgainstEachOther) {
   for (const int values : {2, 3, 5}) {
     Observations o = observations(16);
@@ -392,7 +321,6 @@ TEST_F(ExplainTest, EffectsThatGoTogetherAreConfounded) {
   expect_contract(e);
 }
 
-/// One that would need an exponent of 25 for the same is no rival.
 /// Of the battery's charge no effect is known, but it sinks with the voltage.
 TEST_F(ExplainTest, AConditionWithoutANameThatGoesWithANamedOneIsSaid) {
   Observations o = observations(16);
@@ -414,6 +342,7 @@ TEST_F(ExplainTest, AConditionWithoutANameThatGoesWithANamedOneIsSaid) {
   EXPECT_THAT(far.warnings, testing::Not(said));
 }
 
+/// One that would need an exponent of 25 for the same is no rival.
 TEST_F(ExplainTest, RivalsStayWithinTheirBounds) {
   Observations o = observations(16);
   Covariate excitation = *o.find("supply_voltage_V");
