@@ -145,6 +145,7 @@ step('a run is recorded anew, and the old one left out', async () => {
 
 step('a tare is asked for once more, recorded, and its age told', async () => {
   assert.match(await health(page(), 'Last tare'), /none|ago/);
+  await until(page(), 'the end of the run', ({phase}) => phase === 'waiting');  // its location is done before
   await page().keyboard.press('t');
   await page().getByRole('button', {name: 'Record tare'}).click();
   await reads(page(), '#runs', /R0018\s+\S+\s+S1\s+tare/);
