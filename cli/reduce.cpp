@@ -129,21 +129,7 @@ int reduce_campaign(const ReduceOptions& options, const CampaignFile& file) {
   return problem || !agreed ? kProblemFound : kWell;
 }
 
-int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
-  if (!options.model.empty() && options.model != "thesis")
-    throw InputError(fmt::format("--model {}: a table is reduced as it is, without a model", options.model));
-  const Convention convention =
-      convention_from_name(options.convention.empty() ? "propeller" : options.convention);
-  const TableReduction reduction = reduce_table_rows(observations_of(file), convention);
-  if (!options.csv.empty()) write_text(options.csv, observations_csv(reduction));
-  if (!options.plot.empty()) {
-    if (const auto reason = draw_coefficients(reduction, options.plot))
-      throw InputError(fmt::format("--plot {}: {}", options.plot, *reason));
-  }
-  if (options.json) {
-    fmt::print("{}\n", table_reduction_json(reduction));
-    return kWell;
-  }
+void print_table(const TableReduction& reduction, Convention convention) {
   Table table({"group", "rows", "speed from [rpm]", "to [rpm]", "C_T median", "spread", "C_T at the lowest",
                "at the highest"});
   for (const TableGroup& group : reduction.groups) {
@@ -159,6 +145,10 @@ int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
     fmt::print("{} rows are left out: the motor stood, or its tachometer had not locked\n",
                reduction.at_rest);
   }
+}
+
+/// Says what of a table is not to be believed. True where that needs mending.
+bool warn_of_table(const TableReduction& reduction) {
   if (!reduction.doubtful.empty()) {
     warn(
         fmt::format("{} rows have a C_T more than three times off their group's median; the first is {}: is "
@@ -176,7 +166,25 @@ int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
                      reduction.unknown));
   }
   const bool implausible = warn_of(implausible_thrust(reduction));
-  return reduction.unknown > 0 || implausible ? kProblemFound : kWell;
+  return reduction.unknown > 0 || implausible;
+}
+
+int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
+  if (!options.model.empty() && options.model != "thesis")
+    throw InputError(fmt::format("--model {}: a table is reduced as it is, without a model", options.model));
+  const Convention convention =
+      convention_from_name(options.convention.empty() ? "propeller" : options.convention);
+  const TableReduction reduction = reduce_table_rows(observations_of(file), convention);
+  if (!options.csv.empty()) write_text(options.csv, observations_csv(reduction));
+  if (!options.plot.empty()) {
+    if (const auto reason = draw_coefficients(reduction, options.plot))
+      throw InputError(fmt::format("--plot {}: {}", options.plot, *reason));
+  }
+  if (options.json)
+    fmt::print("{}\n", table_reduction_json(reduction));
+  else
+    print_table(reduction, convention);
+  return warn_of_table(reduction) ? kProblemFound : kWell;
 }
 
 int run_reduce(const ReduceOptions& options) {

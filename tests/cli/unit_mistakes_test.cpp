@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 namespace tunnelrig {
 namespace {
@@ -94,7 +95,12 @@ TEST_F(UnitMistakes, ATableWhoseDiameterIsInAnotherUnit) {
   const ProgramResult inches = reduce_with("9");
   EXPECT_EQ(inches.code, 0);
   EXPECT_THAT(inches.error, HasSubstr("is less than any propeller's"));
-  EXPECT_EQ(reduce_with("0.09").code, 1) << "more than any propeller's is no rig at rest";
+  const ProgramResult centimetres = reduce_with("0.09");
+  EXPECT_EQ(centimetres.code, 1) << "more than any propeller's is no rig at rest";
+  const ProgramResult for_machines = run("reduce --db t.db --json");
+  EXPECT_EQ(for_machines.code, 1) << "as without --json";
+  EXPECT_EQ(for_machines.error, centimetres.error);
+  EXPECT_TRUE(nlohmann::json::accept(for_machines.out)) << for_machines.out;
 }
 
 /// A doubt is a warning: what was written is stored.
