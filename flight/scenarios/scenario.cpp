@@ -56,7 +56,7 @@ Trajectory ladder(const Room& room) {
   for (std::size_t i = 1; i < heights.size(); ++i) {
     const double begun_s = path.duration_s();
     path.move({y, heights[i]}, 0.2);
-    path.hold({y, heights[i]}, begun_s + 15 - path.duration_s());
+    path.hold({y, heights[i]}, std::max(0.0, begun_s + 15 - path.duration_s()));  // a long way takes longer
   }
   return path;
 }
@@ -76,7 +76,7 @@ Scenario circle(const std::string& tunnel, const Room& room) {
 /// far as it does.
 Trajectory waypoints(const Room& room) {
   std::array<Plane, 4> points = {{{0, 0.6}, {1, 1.1}, {1, 1.5}, {0, 0.6}}};
-  if (room.reach[0] < 1.1)
+  if (room.reach[0] < 1.1 || room.at(0, 1)[1] < 1.6)
     points = {{room.at(0, -0.6), room.at(0.7, 0), room.at(0.7, 0.5), room.at(0, -0.6)}};
   Trajectory path;
   path.hold(points[0], 5);

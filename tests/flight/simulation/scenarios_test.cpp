@@ -1,9 +1,13 @@
+#include "datasets/csv.h"
 #include "datasets/error.h"
 #include "flight/scenarios/scenario.h"
+#include "support/temporary_folder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,6 +35,28 @@ TEST_F(Scenarios, OfTheThesisFitEveryTunnelOfTheThesis) {
     const FlightSpace there(tunnel_from(tunnel), frame);
     for (const std::string_view name : scenario_names())
       EXPECT_NO_THROW(scenario_from(std::string(name), there, frame)) << name << " in " << tunnel;
+  }
+}
+
+TEST_F(Scenarios, FitLowAndTallTunnelsTooWithoutAJump) {
+  const test::TemporaryFolder folder;
+  for (const double height_m : {1.2, 1.5, 60.0}) {
+    write_text(folder / "box.toml",
+               fmt::format("name = \"box\"\nshape = \"box\"\nwidth_m = 4\nheight_m = {}\nlength_m = 10\n",
+                           height_m));
+    const FlightSpace there(tunnel_from((folder / "box.toml").string()), frame);
+    for (const char* name : {"hover", "diagonal", "ladder", "waypoints"}) {
+      SCOPED_TRACE(fmt::format("{} in {} m", name, height_m));
+      const Trajectory path = scenario_from(name, there, frame).trajectory;
+      Plane before = path.at(0).position_m;
+      double farthest_m = 0;
+      for (double t = 0; t <= path.duration_s(); t += 0.02) {
+        const Plane at = path.at(t).position_m;
+        farthest_m = std::max(farthest_m, std::hypot(at[0] - before[0], at[1] - before[1]));
+        before = at;
+      }
+      EXPECT_LT(farthest_m, 0.5) << "m within 20 ms";
+    }
   }
 }
 
