@@ -39,6 +39,11 @@ std::string error_text(double error_m, int decimals) {
   return std::isfinite(error_m) ? fmt::format("{:.{}f}", kMm * error_m, decimals) : "lost";
 }
 
+std::string interval_text(const Comparison& c) {
+  if (c.lost > 0) return "lost";
+  return c.has_interval() ? fmt::format("{:.1f} to {:.1f}", kMm * c.ci95_low_m, kMm * c.ci95_high_m) : "-";
+}
+
 nlohmann::ordered_json controller_json(const Comparison& c) {
   nlohmann::ordered_json json{{"name", c.controller},
                               {"runs", c.runs.size()},
@@ -52,7 +57,7 @@ nlohmann::ordered_json controller_json(const Comparison& c) {
                               {"first_contact_s", nullptr},
                               {"estimator_rms_mm", rounded(kMm * c.estimator_rms_m)},
                               {"thrust_saturated_s", rounded(c.saturated_s)}};
-  if (c.lost == 0) json["ci95_rms_mm"] = {error_mm(c.ci95_low_m), error_mm(c.ci95_high_m)};
+  if (c.has_interval()) json["ci95_rms_mm"] = {error_mm(c.ci95_low_m), error_mm(c.ci95_high_m)};
   if (c.first_contact_s) json["first_contact_s"] = rounded(*c.first_contact_s);
   return json;
 }
@@ -158,10 +163,8 @@ void print_flown(const FlownScenario& flown) {
   for (const Comparison& c : flown.controllers) {
     const auto mm = [](double m) { return error_text(m, 1); };
     table.add({c.controller, mm(c.rms_y_m), mm(c.rms_z_m), mm(c.largest_y_m), mm(c.largest_z_m),
-               mm(c.p95_y_m), mm(c.p95_z_m),
-               c.lost > 0 ? "lost" : fmt::format("{:.1f} to {:.1f}", kMm * c.ci95_low_m, kMm * c.ci95_high_m),
-               fmt::format("{:.2f}", c.effort_N), fmt::format("{:.2f}", c.saturated_s),
-               fmt::format("{:.1f}", kMm * c.estimator_rms_m),
+               mm(c.p95_y_m), mm(c.p95_z_m), interval_text(c), fmt::format("{:.2f}", c.effort_N),
+               fmt::format("{:.2f}", c.saturated_s), fmt::format("{:.1f}", kMm * c.estimator_rms_m),
                c.nees > 0 ? fmt::format("{:.2f}", c.nees / 4) : "-",
                contacts_text(c) +
                    (c.lost > 0 ? fmt::format("; {} of {} flights lost", c.lost, c.runs.size()) : "")});

@@ -131,8 +131,11 @@ void summarise(Comparison& all) {
       all.first_contact_s = run.touched[0].time_s;
   }
   for (const RunResult& run : all.runs) squares += (run.rms_m() - mean) * (run.rms_m() - mean);
-  const double half =
-      n > 1 && all.lost == 0 ? student_975(static_cast<int>(n) - 1) * std::sqrt(squares / (n - 1) / n) : 0;
+  double half = 0;
+  if (all.runs.size() < 2)
+    half = std::numeric_limits<double>::infinity();  // one run says nothing of how runs differ
+  else if (all.lost == 0)
+    half = student_975(static_cast<int>(n) - 1) * std::sqrt(squares / (n - 1) / n);
   all.rms_y_m = std::sqrt(y2);
   all.rms_z_m = std::sqrt(z2);
   all.estimator_rms_m = std::sqrt(e2);

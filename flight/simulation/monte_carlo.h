@@ -71,7 +71,9 @@ struct Comparison {
   std::vector<RunResult> runs;
   double rms_y_m = 0, rms_z_m = 0;  // over all runs
   double largest_y_m = 0, largest_z_m = 0, p95_y_m = 0, p95_z_m = 0;
-  double ci95_low_m = 0, ci95_high_m = 0;  // of the mean of RunResult::rms_m, Student's t; not below 0
+  // Of the mean of RunResult::rms_m, Student's t; not below 0. Of one run: 0 and infinite.
+  double ci95_low_m = 0, ci95_high_m = 0;
+  bool has_interval() const { return lost == 0 && runs.size() > 1; }
   int contacts = 0, runs_with_contact = 0, lost = 0;
   std::optional<double> first_contact_s;  // earliest of all runs
   double estimator_rms_m = 0, nees = 0, effort_N = 0;

@@ -102,6 +102,14 @@ TEST_F(MonteCarlo, AFlightThatIsLostHasNoError) {
     EXPECT_TRUE(std::isinf(error_m)) << error_m;
 }
 
+TEST_F(MonteCarlo, OneFlightSaysNothingOfHowFlightsDiffer) {
+  const Comparison one = fly_runs(task(1, 1), "ibs", frozen_gains());
+  EXPECT_FALSE(one.has_interval());
+  EXPECT_EQ(one.ci95_low_m, 0);
+  EXPECT_TRUE(std::isinf(one.ci95_high_m));
+  EXPECT_TRUE(fly_runs(task(2, 1), "ibs", frozen_gains()).has_interval());
+}
+
 TEST_F(MonteCarlo, UnknownControllersAndTruthsAreRefused) {
   EXPECT_THROW(fly_runs(task(2, 2), "lqr", frozen_gains()), InputError);
   EXPECT_THROW((HiddenTruth{.payload_kg = -1}.validate()), InputError);
