@@ -182,30 +182,69 @@ void maximise(const Design& design, bool free_visit, bool free_session, double s
   }
 }
 
-/// Covariance of the two estimates: the inverse of the expected information, ½ tr(P V_k P V_l).
+/// P₀ B for a matrix with a row per visit, P₀ being P below without sessions: what locations explain is taken
+/// off, location by location.
+Eigen::MatrixXd less_locations(const Design& design, const Eigen::VectorXd& weight,
+                               const Eigen::MatrixXd& b) {
+  const auto locations = static_cast<Eigen::Index>(design.locations);
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(locations, b.cols());
+  Eigen::VectorXd total = Eigen::VectorXd::Zero(locations);
+  for (Eigen::Index v = 0; v < b.rows(); ++v) {
+    const auto l = static_cast<Eigen::Index>(design.visits[static_cast<std::size_t>(v)].location);
+    mean.row(l) += weight(v) * b.row(v);
+    total(l) += weight(v);
+  }
+  Eigen::MatrixXd result(b.rows(), b.cols());
+  for (Eigen::Index v = 0; v < b.rows(); ++v) {
+    const auto l = static_cast<Eigen::Index>(design.visits[static_cast<std::size_t>(v)].location);
+    result.row(v) = weight(v) * (b.row(v) - mean.row(l) / total(l));
+  }
+  return result;
+}
+
+/// tr P₀²
+double squares_less_locations(const Design& design, const Eigen::VectorXd& weight) {
+  std::vector<double> sum(design.locations), squares(design.locations), cubes(design.locations);
+  for (std::size_t v = 0; v < design.visits.size(); ++v) {
+    const double w = weight(static_cast<Eigen::Index>(v));
+    const std::size_t l = design.visits[v].location;
+    sum[l] += w;
+    squares[l] += w * w;
+    cubes[l] += w * w * w;
+  }
+  double trace = 0;
+  for (std::size_t l = 0; l < design.locations; ++l) {
+    if (sum[l] > 0) trace += squares[l] - 2 * cubes[l] / sum[l] + std::pow(squares[l] / sum[l], 2);
+  }
+  return trace;
+}
+
+/// Covariance of the two estimates: the inverse of the expected information, ½ tr(P V_k P V_l). With Z the
+/// sessions of the visits and G = (I + σ² Zᵀ P₀ Z)⁻¹ is P = P₀ − σ² P₀ Z G Zᵀ P₀, so that nothing is larger
+/// than visits times sessions.
 Eigen::Matrix2d covariance_of_estimates(const Design& design, const VarianceComponents& components) {
   const auto n = static_cast<Eigen::Index>(design.visits.size());
-  Eigen::MatrixXd session_part = Eigen::MatrixXd::Zero(n, n), total(n, n);
-  Eigen::MatrixXd locations = Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(design.locations));
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const Visit& a = design.visits[static_cast<std::size_t>(i)];
-    locations(i, static_cast<Eigen::Index>(a.location)) = 1;
-    for (Eigen::Index j = 0; j < n; ++j) {
-      session_part(i, j) = a.session == design.visits[static_cast<std::size_t>(j)].session ? 1 : 0;
-    }
+  const auto sessions = static_cast<Eigen::Index>(design.sessions);
+  Eigen::VectorXd weight(n);
+  Eigen::MatrixXd z = Eigen::MatrixXd::Zero(n, sessions);
+  for (Eigen::Index v = 0; v < n; ++v) {
+    const Visit& visit = design.visits[static_cast<std::size_t>(v)];
+    weight(v) = 1 / (components.visit + own_variance(visit, components));
+    z(v, static_cast<Eigen::Index>(visit.session)) = 1;
   }
-  total = components.session * session_part;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    total(i, i) += components.visit + own_variance(design.visits[static_cast<std::size_t>(i)], components);
-  }
-  const Eigen::MatrixXd inverse = total.llt().solve(Eigen::MatrixXd::Identity(n, n));
-  const Eigen::MatrixXd inverse_x = inverse * locations;
-  const Eigen::MatrixXd p =
-      inverse - inverse_x * (locations.transpose() * inverse_x).ldlt().solve(inverse_x.transpose());
-  const Eigen::MatrixXd p_session = p * session_part;
-  const double visit_visit = 0.5 * p.squaredNorm();
-  const double visit_session = 0.5 * p.cwiseProduct(p_session.transpose()).sum();
-  const double session_session = 0.5 * p_session.cwiseProduct(p_session.transpose()).sum();
+  const Eigen::MatrixXd p_z = less_locations(design, weight, z);  // P₀ Z
+  const Eigen::MatrixXd once = z.transpose() * p_z, twice = p_z.transpose() * p_z,
+                        thrice = p_z.transpose() * less_locations(design, weight, p_z);  // Zᵀ P₀ᵏ Z
+  const double session = components.session;
+  const Eigen::MatrixXd g = (Eigen::MatrixXd::Identity(sessions, sessions) + session * once)
+                                .llt()
+                                .solve(Eigen::MatrixXd::Identity(sessions, sessions));
+  const Eigen::MatrixXd g_once = g * once, g_twice = g * twice;
+  const double visit_visit =
+      0.5 * (squares_less_locations(design, weight) - 2 * session * g.cwiseProduct(thrice).sum() +
+             session * session * g_twice.cwiseProduct(g_twice.transpose()).sum());
+  const double visit_session = 0.5 * (p_z * g).squaredNorm();
+  const double session_session = 0.5 * g_once.cwiseProduct(g_once.transpose()).sum();
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
   if (components.visit_known && components.session_known) {
     Eigen::Matrix2d information;

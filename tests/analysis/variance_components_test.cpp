@@ -2,9 +2,14 @@
 
 #include "support/seeds.h"
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <map>
 #include <random>
+#include <utility>
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 namespace tunnelrig {
@@ -85,6 +90,50 @@ TEST(VarianceComponents, LocationsThatScatterDifferentlyKeepTheirOwn) {
   const VarianceComponents alike = fit_variance_components(simulate({}, 0.3, 0, 0, engine));
   for (const double variance : alike.run_by_location)
     EXPECT_EQ(variance, alike.run) << "what chance explains is pooled";
+}
+
+/// ½ tr(P V_k P V_l), written out with a matrix of visits times visits.
+TEST(VarianceComponents, TheirCovarianceIsTheInverseInformation) {
+  std::mt19937_64 engine(7);
+  const GroupedRuns runs = simulate({.locations = 6, .sessions = 5}, 0.3, 0.2, 0.5, engine);
+  const VarianceComponents found = fit_variance_components(runs);
+  std::map<std::pair<std::size_t, std::size_t>, double> visits;  // runs of each
+  for (std::size_t i = 0; i < runs.value.size(); ++i) visits[{runs.location[i], runs.session[i]}] += 1;
+  const auto n = static_cast<Eigen::Index>(visits.size());
+  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(n, 6), z = Eigen::MatrixXd::Zero(n, 5);
+  Eigen::MatrixXd v = found.visit * Eigen::MatrixXd::Identity(n, n);
+  Eigen::Index row = 0;
+  for (const auto& [place, count] : visits) {
+    x(row, static_cast<Eigen::Index>(place.first)) = z(row, static_cast<Eigen::Index>(place.second)) = 1;
+    v(row, row) += found.run_by_location[place.first] / count;
+    ++row;
+  }
+  v += found.session * z * z.transpose();
+  const Eigen::MatrixXd w = v.inverse();
+  const Eigen::MatrixXd p = w - w * x * (x.transpose() * w * x).inverse() * x.transpose() * w;
+  const Eigen::MatrixXd p_session = p * z * z.transpose();
+  Eigen::Matrix2d information;
+  information << (p * p).trace(), (p * p_session).trace(), (p * p_session).trace(),
+      (p_session * p_session).trace();
+  const Eigen::Matrix2d expected = (0.5 * information).inverse();
+  EXPECT_LT((found.covariance - expected).norm(), 1e-9 * expected.norm());
+}
+
+TEST(VarianceComponents, ThreeTimesTheVisitsTakeThreeTimesAsLong) {
+  std::mt19937_64 engine(9);
+  const auto seconds = [&](std::size_t locations) {
+    const GroupedRuns runs = simulate({.locations = locations, .sessions = 20, .per_visit = 1, .visits = 20},
+                                      0.3, 0.2, 0.5, engine);
+    double least = 1e9;
+    for (int i = 0; i < 3; ++i) {
+      const auto begin = std::chrono::steady_clock::now();
+      EXPECT_GT(fit_variance_components(runs).covariance(0, 0), 0);
+      least =
+          std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    }
+    return least;
+  };
+  EXPECT_LT(seconds(150) / seconds(50), 9) << "27 where matrices of visits times visits are multiplied";
 }
 
 TEST(LocationMeans, SharedSessionsCorrelateLocations) {
