@@ -67,6 +67,11 @@ function flightTable({controllers}) {
   ], controllers);
 }
 
+const positions = {
+  lidar: 'from LIDAR scans, matcher and filter',
+  'lidar-thesis': 'from LIDAR scans, matcher and the thesis’s filter',
+};
+
 function flightsSection({flights, command}) {
   return [
     h('p', {}, prose('All of it is simulated: vehicle, air, LIDAR. Errors are reference less position; those of the ' +
@@ -75,7 +80,7 @@ function flightsSection({flights, command}) {
       const {tunnel, scenario, map, position} = flight;
       const title = `${scenario} in the ${tunnel} tunnel`;
       const caption = `The first run of each controller; map: ${map}; position: ${
-          position === 'lidar' ? 'from LIDAR scans, matcher and filter' : 'given'}. Single runs have no error bars; the intervals of the table are Student’s, over the runs. A click on the legend hides or shows.`;
+          positions[position] ?? position}. Single runs have no error bars; the intervals of the table are Student’s, over the runs. A click on the legend hides or shows.`;
       return figure(title, [], [
         plot(`Paths, ${title}`, (width) => Math.min(560, Math.max(380, 0.7 * width)), (width) => drawPaths(flight, width)),
         plot(`Error in y, ${title}`, () => 260, () => drawFlightErrors(flight, 'y_m', 'y')),

@@ -125,6 +125,9 @@ const findings = `JSON.stringify([
   ...[...document.querySelectorAll("section")].filter((s) => s.children.length < 2).map((s) => "section " + s.id + " is empty"),
   ...[...document.querySelectorAll(".plot")].filter((p) => !p.querySelector(".main-svg .trace, .main-svg .hm, .main-svg .points path"))
     .map((p) => "nothing is drawn in: " + p.getAttribute("aria-label")),
+  ...(JSON.parse(document.getElementById("data").textContent).sections?.flights?.flights ?? [])
+    .filter((f) => f.position !== "given" && !document.body.innerText.includes("position: from LIDAR scans"))
+    .map((f) => "the page does not say that the position of " + f.scenario + " is by " + f.position),
   ...(/undefined|NaN|\\[object/.test(document.body.innerText) ? ["a value that is none stands in the text"] : []),
 ])`;
 

@@ -33,7 +33,7 @@ bool has(const char* program) { return output_of(fmt::format("command -v {}", pr
 /// Two points of a flight whose names are hostile.
 constexpr const char* kFlights =
     R"({"format": "tunnelrig-flights/1", "command": "tunnelrig fly --out </script>",
-  "flights": [{"tunnel": "1.5", "scenario": "<b>hover", "map": "m.json", "position": "lidar",
+  "flights": [{"tunnel": "1.5", "scenario": "<b>hover", "map": "m.json", "position": "lidar-thesis",
     "walls": [[-0.75, 0], [0.75, 0], [0.75, 1.5], [-0.75, 1.5]],
     "reference": {"time_s": [0, 0.1], "y_m": [0, 0], "z_m": [0.75, 0.75]},
     "controllers": [{"name": "</script><b>%{x}", "runs": 2, "rms_y_mm": 3.1, "rms_z_mm": 2, "max_y_mm": 9,
