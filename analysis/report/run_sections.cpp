@@ -92,17 +92,18 @@ Json health_section(const Material& material) {
 Json tares_section(const Material& material) {
   Json readings = Json::array();
   const auto& certificate = material.data.certificate;
-  for (const Run& run : material.data.runs) {
-    const auto statistics = material.data.statistics.find(run.run);
-    if (run.kind != RunKind::kTare || statistics == material.data.statistics.end()) continue;
+  for (const std::size_t tare : tare_runs(material.data)) {
+    const Run& run = material.data.runs[tare];
     Json reading{{"run", run.run}, {"session", run.session}, {"start_s", run.start_s}};
     for (int rotor = 0; rotor < material.data.info.rig.rotors; ++rotor) {
-      const ChannelStatistics& channel = statistics->second.channels[static_cast<std::size_t>(rotor)];
+      const ChannelStatistics& channel =
+          material.data.statistics.at(run.run).channels[static_cast<std::size_t>(rotor)];
       reading["mean_V"].push_back(channel.mean_V);
       reading["standard_error_V"].push_back(channel.standard_error_V);
     }
     readings.push_back(std::move(reading));
   }
+  if (material.data.raw.empty()) return absent("The runs give thrusts, not voltages, so there are no zeros.");
   if (readings.empty()) {
     return absent(
         "No session has a tare (a run with motors stopped); the zero of every run is the calibration's, "

@@ -7,6 +7,7 @@
 #include "campaigns.h"
 #include "datasets/csv.h"
 #include "datasets/error.h"
+#include "datasets/run_marks.h"
 #include "support/message_of.h"
 #include "support/temporary_folder.h"
 
@@ -128,6 +129,15 @@ TEST_F(ReportTest, RunsCarryTheirHealth) {
   EXPECT_FALSE(page["sections"]["findings"].empty());
 }
 
+TEST_F(ReportTest, ATareThatDoesNotCountIsNoZero) {
+  make_campaign(db, {});
+  {
+    CampaignFile file(db, CampaignFile::Access::kWrite);
+    exclude_run(file, file.runs().back().run, "the motors were running");
+  }
+  EXPECT_EQ(Json::parse(report().json)["sections"]["tares"]["readings"].size(), 3u) << "of four";
+}
+
 TEST_F(ReportTest, PlanesStandAtTheirDistance) {
   const Json page = json({});
   const Json& planes = page["sections"]["open_space"]["planes"];
@@ -208,19 +218,18 @@ INSTANTIATE_TEST_SUITE_P(
                              {"budget", "no run was repeated"},
                              {"calibration", kGiven},
                              {"health", kGiven},
-                             {"tares", "No session has a tare"}}},
+                             {"tares", kGiven}}},
                     Lacking{"Tares", {.tares = false}, {{"tares", "No session has a tare"}}},
-                    Lacking{
-                        "RawData",
-                        {.raw_data = false},
-                        {{"calibration", kGiven}, {"health", kGiven}, {"tares", "No session has a tare"}}},
+                    Lacking{"RawData",
+                            {.raw_data = false},
+                            {{"calibration", kGiven}, {"health", kGiven}, {"tares", kGiven}}},
                     Lacking{"Rotors",
                             {.raw_data = false, .rotors = 1},
                             {{"maps", "needs four rotors"},
                              {"uneven", "1 rotor."},
                              {"calibration", kGiven},
                              {"health", kGiven},
-                             {"tares", "No session has a tare"}}}),
+                             {"tares", kGiven}}}),
     [](const auto& lacking) { return std::string("Lacks") + lacking.param.name; });
 
 TEST_F(ReportTest, ATermWithoutItsMeasurementIsAReason) {
