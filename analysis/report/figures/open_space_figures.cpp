@@ -120,6 +120,15 @@ std::pair<double, double> reach(const OpenSpace& space) {
   return {0, furthest_R > 0 ? 1.1 * furthest_R : 1};
 }
 
+std::string caption_of(const OpenSpace& space) {
+  if (!space.tunnel)
+    return "C_T in open space (grey band: C_T at OS with its U95), above a ground plane (GND) and beneath a "
+           "ceiling plane (CEIL), by the distance of the rotors from the plane. Bars: U95.";
+  return "C_T in the tunnel against open space (grey band: C_T at OS with its U95), above a ground plane "
+         "(GND) and beneath a ceiling plane (CEIL). A point at distance d from a plane stands at the height "
+         "in the tunnel that is as far from its floor or ceiling. Bars: U95.";
+}
+
 }  // namespace
 
 Figures open_space_figures(const Material& material, double width_mm) {
@@ -151,12 +160,7 @@ Figures open_space_figures(const Material& material, double width_mm) {
     script += panel(space, curves, sheet, left, right, top + kKey_mm - 2.2);
   }
   script += "unset multiplot\n";
-  return {
-      {{"open_space", sheet, script,
-        "C_T in the tunnel against open space (grey band: C_T at OS with its U95), above a ground plane "
-        "(GND) and beneath a ceiling plane (CEIL). A point at distance d from a plane stands at the height "
-        "in the tunnel that is as far from its floor or ceiling. Bars: U95."}},
-      {}};
+  return {{{"open_space", sheet, script, caption_of(space)}}, {}};
 }
 
 }  // namespace tunnelrig::report

@@ -199,6 +199,9 @@ TEST_F(DrawnFiguresTest, OpenSpaceAloneAndFewerRotorsAreDrawnToo) {
     std::filesystem::remove_all(folder / "c.db.folder");
     test::make_campaign(db, parts);
     EXPECT_THAT(stems(write(settings()).files), testing::IsSupersetOf({"c_t_by_location", "open_space"}));
+    EXPECT_EQ(read_text(out / "captions.md").find("the height in the tunnel") != std::string::npos,
+              parts.tunnel)
+        << "without a tunnel the axis is the distance";
   }
 }
 
