@@ -106,7 +106,9 @@ Figure errors_figure(const Json& flight, const std::string& name, double width_m
     const double low = known ? interval[0].get<double>() : NAN,
                  high = known ? interval[1].get<double>() : NAN;
     auto& rows = one["contacts"].get<double>() > 0 ? touched : clean;
-    if (!lost) rows.push_back({known ? 0.5 * (low + high) : rms, y, known ? low : rms, known ? high : rms});
+    // The mean is in the interval's middle, except where that ends at 0.
+    const double mean = known && low > 0 ? 0.5 * (low + high) : rms;
+    if (!lost) rows.push_back({mean, y, known ? low : rms, known ? high : rms});
     tics += fmt::format("{}{} {}", i == 0 ? "" : ", ",
                         gnuplot_text(one["name"].get<std::string>() + (lost ? " (lost)" : "")), y);
   }
@@ -131,6 +133,7 @@ Figure errors_figure(const Json& flight, const std::string& name, double width_m
   };
   add("clean", clean, {"no contact", category_colour(0), 7});
   add("touched", touched, {"touched a wall", category_colour(1), 2});
+  if (plot.empty()) plot = "set xrange [0:1]\nplot NaN";  // every controller lost a flight
   script += legend(sheet, entries, sheet.height_mm - 2.2, 2, kLeft_mm);
   return {
       name, sheet, script + plot + "\n",

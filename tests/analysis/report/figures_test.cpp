@@ -17,6 +17,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 namespace tunnelrig {
 namespace {
@@ -176,6 +177,21 @@ TEST_F(DrawnFiguresTest, ModelsAndFlightsHaveFiguresWhereThereAreSome) {
       EXPECT_THAT(captions, HasSubstr("**" + name + ".pdf**"));
     }
   }
+}
+
+TEST_F(DrawnFiguresTest, ControllersThatAllLostAFlightAreNamed) {
+  test::make_campaign(db, {.raw_data = false, .columns = 1, .rows = 1});
+  nlohmann::json flights = nlohmann::json::parse(kHostileFlights);
+  for (nlohmann::json& controller : flights["flights"][0]["controllers"]) {
+    controller["lost"] = 1;
+    for (const char* error : {"rms_y_mm", "rms_z_mm", "max_y_mm", "max_z_mm", "ci95_rms_mm"})
+      controller[error] = nullptr;
+  }
+  write_text(folder / "flights.json", flights.dump());
+  ReportSettings report = settings();
+  report.flights = (folder / "flights.json").string();
+  EXPECT_TRUE(stems(write(report).files).contains("flight_1_errors"));
+  EXPECT_GT(std::filesystem::file_size(out / "flight_1_errors.pdf"), 1000U);
 }
 
 TEST_F(DrawnFiguresTest, WhatCannotBeDrawnIsSaid) {
