@@ -155,7 +155,7 @@ void LiveFeed::tick(Time time) {
     std::error_code error;
     const auto space =
         std::filesystem::space(std::filesystem::absolute(campaign_, error).parent_path(), error);
-    if (!error) disk_free_B_ = static_cast<double>(space.available);
+    if (!error) disk_ = space;
   }
   const bool watched = viewers_.count() > 0;
   if (time >= next_spectrum_ && view_ && view_->window.full() && now.position.phase == Phase::kRecording) {

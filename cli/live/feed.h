@@ -124,11 +124,14 @@ class LiveFeed {
   std::vector<LiveFrame> taken_;
   std::optional<View> view_;
   std::optional<double> shaft_hz_;
-  double disk_free_B_ = 0;
+  std::filesystem::space_info disk_{};  // all 0: not known yet
   Time next_state_{}, next_spectrum_{}, next_disk_{};
   std::pair<Phase, std::string> told_{Phase::kIdle, ""};  // phase and run of the last state
   std::thread thread_;
 };
+
+/// Of a disk that is known; a full one has none left.
+bool is_low(const std::filesystem::space_info& disk);
 
 /// Lets every other thread go first.
 void lower_priority(int nice);

@@ -28,6 +28,10 @@ Json ledger_json(const Ledger& ledger) {
 
 }  // namespace
 
+bool is_low(const std::filesystem::space_info& disk) {
+  return disk.capacity > 0 && static_cast<double>(disk.available) < kDiskLow_B;
+}
+
 std::string LiveFeed::state_json(const Shared& now, const Scale& scale) const {
   const Position& position = now.position;
   const Progress& progress = now.progress;
@@ -44,7 +48,7 @@ std::string LiveFeed::state_json(const Shared& now, const Scale& scale) const {
             {"silent", progress.silent},
             {"ledger", ledger_json(progress.ledger)},
             {"ring_high_water", progress.ring_frames ? Json(*progress.ring_frames) : Json(nullptr)},
-            {"disk_free_B", disk_free_B_}};
+            {"disk_free_B", disk_.available}};
   const double nominal_hz = info_.daq.sample_rate_hz;
   const auto& clock = progress.clock;
   json["board_clock_ppm"] = clock ? Json(1e6 * (clock->rate_hz / nominal_hz - 1)) : Json(nullptr);
@@ -89,8 +93,8 @@ void LiveFeed::check(const Shared& now, const Scale& scale, Time time) {
   const bool recording = now.position.phase == Phase::kRecording;
   const Ledger& ledger = now.progress.ledger;
   const std::lock_guard lock(mutex_);
-  alarms_.set("disk", 0, disk_free_B_ > 0 && disk_free_B_ < kDiskLow_B,
-              fmt::format("{:.0f} MB left on the disk", disk_free_B_ / 1e6), time);
+  alarms_.set("disk", 0, is_low(disk_),
+              fmt::format("{:.0f} MB left on the disk", static_cast<double>(disk_.available) / 1e6), time);
   const auto tare = now.cells->tares.find(run.session);
   if (tare != now.cells->tares.end() && tare->second.drift_rotor > 0) {
     const double drift_V = tare->second.drift_V;

@@ -193,6 +193,14 @@ TEST_F(Watched, ChannelsThatAreWrongAlarm) {
   EXPECT_EQ(feed.end(outcome), "clipping;overload;stuck;tare_drift");
 }
 
+TEST(Disk, AFullOneIsLowToo) {
+  constexpr std::uintmax_t kGB = 1'000'000'000;
+  EXPECT_FALSE(is_low({})) << "not known yet";
+  EXPECT_FALSE(is_low({.capacity = 100 * kGB, .free = 50 * kGB, .available = 45 * kGB}));
+  EXPECT_TRUE(is_low({.capacity = 100 * kGB, .free = kGB, .available = kGB / 3}));
+  EXPECT_TRUE(is_low({.capacity = 100 * kGB, .free = 5 * kGB, .available = 0})) << "but for the superuser";
+}
+
 TEST_F(Watched, RequestsAreAnsweredAndRefusedOverTheSocket) {
   EXPECT_EQ(test::get(port(), "/").body, "the page");
   EXPECT_EQ(test::get(port(), "/../../etc/passwd").status, 404);
