@@ -108,7 +108,14 @@ bool warn_of_left_out(const CampaignData& data, const Reduction& reduction) {
   return problem;
 }
 
+/// What was asked for and would not be done.
+void refuse(bool asked, const char* option, const char* why) {
+  if (asked) throw InputError(fmt::format("{}: {}", option, why));
+}
+
 int reduce_campaign(const ReduceOptions& options, const CampaignFile& file) {
+  refuse(!options.plot.empty(), "--plot",
+         "draws a table of observations; `map` and `report --figures` draw a campaign");
   CampaignData data = read_campaign_data(file);
   const bool agreed = !options.from_raw || refresh_from_raw(options, data);
   const Convention convention =
@@ -172,6 +179,9 @@ bool warn_of_table(const TableReduction& reduction) {
 int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
   if (!options.model.empty() && options.model != "thesis")
     throw InputError(fmt::format("--model {}: a table is reduced as it is, without a model", options.model));
+  refuse(!options.terms.empty(), "--with", "a table is reduced as it is, without a model");
+  refuse(!options.runs_csv.empty(), "--runs-csv", "a table has no runs; --csv writes a row per observation");
+  refuse(options.from_raw, "--from-raw", "a table has no raw data");
   const Convention convention =
       convention_from_name(options.convention.empty() ? "propeller" : options.convention);
   const TableReduction reduction = reduce_table_rows(observations_of(file), convention);

@@ -237,6 +237,26 @@ TEST_F(BadInput, OutputThatCannotBeWritten) {
   }
 }
 
+/// What is asked for and would not be done is refused, not left out in silence.
+TEST_F(BadInput, OptionsThatTheFileCannotServe) {
+  write_text(folder / "t.csv", "N,y\n3000,0.1\n4000,0.11\n");
+  write_text(folder / "t.toml",
+             "format = \"tunnelrig-table/1\"\n[response]\ncolumn = \"y\"\nunit = \"1\"\n"
+             "meaning = \"c_t_propeller\"\n[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n");
+  ASSERT_EQ(test::run_program(folder.path(), "import t.csv --format table --schema t.toml --db t.db").code,
+            0);
+  const std::vector<std::string> files = {"t.csv", "t.toml", "t.db"};
+  for (const char* option : {"--runs-csv r.csv", "--from-raw", "--with rotor_speed"})
+    EXPECT_THAT(refusal_of(std::string("reduce --db t.db --csv o.csv ") + option, files),
+                HasSubstr("a table"))
+        << option;
+  fs::remove(folder / "t.db");
+  campaign.write(folder / "source");
+  ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
+  EXPECT_THAT(refusal_of("reduce --db c.db --plot p.svg", {"t.csv", "t.toml", "source", "c.db"}),
+              HasSubstr("--plot: draws a table of observations"));
+}
+
 /// gnuplot runs what stands in backquotes, if it stands in double quotes.
 TEST_F(BadInput, NamesInATableAreNoCommands) {
   write_text(folder / "t.csv",
