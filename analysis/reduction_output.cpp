@@ -111,11 +111,13 @@ std::string runs_csv(const CampaignData& data, const Reduction& reduction, Conve
                        run.repeat, csv_cell(run.session), format_utc(run.start_s), cell(factor * reduced.c_t),
                        cell(reduced.u_percent, "{:.6f}"), reduced.density_kg_m3, reduced.speed_rpm);
     for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
-      csv += fmt::format(",{:.6f}", reduced.thrust_N[static_cast<std::size_t>(rotor)]);
+      csv += "," + cell(reduced.thrust_N[static_cast<std::size_t>(rotor)]);
     }
-    csv += fmt::format(",{},{},{},{},{},{}\n", cell(factor * reduced.c_t_standard_error, "{:.4g}"),
-                       reduced.stationary ? 1 : 0, reduced.clipped, reduced.zero_from_calibration ? 1 : 0,
-                       name_of(convention), csv_model(reduction));
+    // The noise of thrusts that stand in the row is not known.
+    const double noise = reduced.from_volts ? reduced.c_t_standard_error : std::nan("");
+    csv += fmt::format(",{},{},{},{},{},{}\n", cell(factor * noise, "{:.4g}"), reduced.stationary ? 1 : 0,
+                       reduced.clipped, reduced.zero_from_calibration ? 1 : 0, name_of(convention),
+                       csv_model(reduction));
   }
   return csv;
 }

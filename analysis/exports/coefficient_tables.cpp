@@ -2,6 +2,8 @@
 #include "analysis/exports/table_builder.h"
 #include "analysis/exports/tables.h"
 
+#include <limits>
+
 namespace tunnelrig::exports {
 namespace {
 
@@ -27,6 +29,10 @@ Table run_coefficients(const CampaignData& data, const Reduction& reduction) {
   const auto of_run = [&data](auto member) {
     return [&data, member](Reduced r) { return data.runs[r.run].*member; };
   };
+  // The noise of thrusts that stand in the row is not known.
+  const auto of_noise = [](double RunCoefficients::*error) {
+    return [error](Reduced r) { return r.from_volts ? r.*error : std::numeric_limits<double>::quiet_NaN(); };
+  };
   TableBuilder<RunCoefficients> table(
       "run_coefficients", "One row per thrust run that was reduced; docs/reduction.md", reduction.runs);
   table.column("run", "", "Name of the run", of_run(&Run::run))
@@ -34,17 +40,21 @@ Table run_coefficients(const CampaignData& data, const Reduction& reduction) {
       .column("repeat", "1", "Number of the repeat", of_run(&Run::repeat))
       .column("session", "", "One set-up of the rig on one day", of_run(&Run::session))
       .column("c_t", "1", "Thrust coefficient, the thesis's (4.18)", &RunCoefficients::c_t)
-      .column("c_t_standard_error", "1", "From the run's noise alone", &RunCoefficients::c_t_standard_error)
+      .column("c_t_standard_error", "1", "From the run's noise alone",
+              of_noise(&RunCoefficients::c_t_standard_error))
       .column("u_percent", "Uneven thrust (5.1); not known for fewer than four rotors",
               &RunCoefficients::u_percent)
-      .column("u_standard_error_percent", "From the run's noise alone", &RunCoefficients::u_standard_error)
+      .column("u_standard_error_percent", "From the run's noise alone",
+              of_noise(&RunCoefficients::u_standard_error))
       .column("total_N", "Sum of the thrusts", &RunCoefficients::total_N);
   for (std::size_t i = 0; i < static_cast<std::size_t>(data.info.rig.rotors); ++i) {
     table.column(fmt::format("thrust_{}_N", i + 1),
                  fmt::format("Mean thrust of rotor {}, corrected by the model", i + 1),
                  [i](Reduced r) { return r.thrust_N[i]; });
-    table.column(fmt::format("thrust_{}_standard_error_N", i + 1), "From the run's noise alone",
-                 [i](Reduced r) { return r.thrust_standard_error_N[i]; });
+    table.column(
+        fmt::format("thrust_{}_standard_error_N", i + 1), "From the run's noise alone", [i](Reduced r) {
+          return r.from_volts ? r.thrust_standard_error_N[i] : std::numeric_limits<double>::quiet_NaN();
+        });
   }
   return table.column("density_kg_m3", "Of the air", &RunCoefficients::density_kg_m3)
       .column("speed_rpm", "Of the rotors, as the model takes it", &RunCoefficients::speed_rpm)

@@ -167,6 +167,15 @@ TEST(ReductionOutput, CsvColumnsAreInTheirOrderAndEmptyMeansNotKnown) {
   EXPECT_EQ(sheet.require_number(0, "y_norm"), 0);
 }
 
+TEST(ReductionOutput, ThrustsOfTheSheetHaveNoNoiseAndAllTheirDigits) {
+  const CampaignData data =
+      given_thrusts("R1,OT,1,S1,2026-03-02T08:00Z,,0.00123456,0.00123,0.00123,0.00123,20,,,\n");
+  const Reduction reduction = reduce_runs(data, {});
+  const Sheet runs = parse_csv(runs_csv(data, reduction, Convention::kThesis), "runs.csv");
+  EXPECT_EQ(runs.text(0, "c_t_standard_error"), "") << "not known, not 0";
+  EXPECT_EQ(runs.require_number(0, "thrust_1_N"), 0.00123456) << "of a rotor of a few millimetres";
+}
+
 TEST(Reduction, ASpeedOfZeroHasNoC_T) {
   const CampaignData data = given_thrusts(
       "R1,OT,1,S1,2026-03-02T08:00Z,,7,7,7,7,20,,,0\nR2,OT,2,S1,2026-03-02T09:00Z,,7,7,7,7,20,,,5000\n");

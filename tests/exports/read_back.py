@@ -240,6 +240,10 @@ class ReadBack(Case):
         self.assertEqual(len(out["tables"]["recordings"]["run"][1]), 0)
         given = np.array([[float(row[f"thrust_{k}_N"]) for k in range(1, 5)] for row in Store(CAMPAIGNS / "thrusts.db").sheet("runs")])
         self.same(np.transpose([out["tables"]["run_coefficients"][f"thrust_{k}_N"][1] for k in range(1, 5)]), given)
+        noise = [name for name in out["tables"]["run_coefficients"] if "standard_error" in name]
+        self.assertEqual(len(noise), 6)
+        for name in noise:
+            self.assertTrue(np.isnan(out["tables"]["run_coefficients"][name][1]).all(), name)
         self.check_dictionary(out)
 
     def test_types_names_and_gaps_of_any_kind(self):
