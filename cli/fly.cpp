@@ -7,7 +7,9 @@
 #include "datasets/output_place.h"
 #include "flight/tuning/tuner.h"
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 
 #include <fmt/format.h>
@@ -57,6 +59,13 @@ std::vector<PlaceAndPath> programme_of(const FlyOptions& options) {
     throw InputError("--scenario all flies in the thesis's tunnels: --tunnel does not go with it");
   return {{"2.4", "hover"},  {"2.4", "diagonal"}, {"2.4", "ladder"},
           {"2.4", "circle"}, {"1.5", "circle"},   {"railway", "waypoints"}};
+}
+
+/// That a result has somewhere to go, before it takes hours.
+void check_place(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (path.empty() || folder.empty() || std::filesystem::is_directory(folder)) return;
+  throw InputError::in(path, "cannot be written: there is no folder {}", folder.string());
 }
 
 /// Everything that can be refused, before anything is flown or printed.
@@ -127,7 +136,20 @@ FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, c
   return flown;
 }
 
+/// Those named have gains that can be tuned.
+void check_tuned(const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    AnyController(name, {}, {});  // says which there are
+    const auto kinds = controller_kinds();
+    const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const auto& k) { return k.name == name; });
+    if (!kind->tuned)
+      throw InputError(
+          fmt::format("--tune: {} flies with the gains of its source, which are not tuned", name));
+  }
+}
+
 int tune_all(const FlyOptions& options) {
+  check_tuned(options.controllers);
   const NamedMap map = map_of(options);
   TuningSettings settings{.budget = options.budget, .workers = options.workers};
   std::vector<Tuned> tuned;
@@ -161,6 +183,8 @@ int run_fly(const FlyOptions& given) {
   options.hidden.validate();
   if (options.position != "lidar" && options.position != "lidar-thesis" && options.position != "given")
     throw InputError(fmt::format("--position {}: must be lidar, lidar-thesis or given", options.position));
+  check_place(options.json);
+  check_place(options.tune);
   if (!options.tune.empty()) return tune_all(options);
   const NamedMap map = map_of(options);
   const GainTable gains =

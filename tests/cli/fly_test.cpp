@@ -180,8 +180,21 @@ TEST_F(Fly, ATunnelThatTheVehicleDoesNotFitIsRefused) {
   EXPECT_THAT(refusal("--tunnel nowhere"), HasSubstr("nowhere"));
 }
 
+TEST_F(Fly, AResultWithoutAPlaceIsRefusedBeforeItIsFlown) {
+  for (const char* option : {"--json", "--tune"}) {
+    const ProgramResult result =
+        run(std::string("--scenario short.toml --controllers ibs --runs 1 --budget 10 ") + option + " no/x");
+    EXPECT_EQ(result.code, 2) << option;
+    EXPECT_EQ(result.out, "") << option;
+    EXPECT_THAT(result.error, HasSubstr("no/x: cannot be written: there is no folder no")) << option;
+  }
+}
+
 TEST_F(Fly, OtherBadOptionsAreRefused) {
   EXPECT_THAT(refusal("--controllers lqr"), HasSubstr("no controller is called 'lqr'; there are ibs,"));
+  for (const char* name : {"lqr", "pid-stock"})
+    EXPECT_THAT(refusal(std::string("--tune tuned.toml --controllers ") + name), HasSubstr(name));
+  EXPECT_FALSE(std::filesystem::exists(folder / "tuned.toml"));
   EXPECT_THAT(refusal("--position guessed"), HasSubstr("must be lidar, lidar-thesis or given"));
   EXPECT_THAT(refusal("--motor-loss 0.9"), HasSubstr("motor_loss"));
   EXPECT_THAT(refusal("--payload-kg nan"), HasSubstr("--payload-kg nan: a number is required"));
