@@ -226,8 +226,8 @@ class Summarizer : public RunSummarizer {
                              .shaft_hz = {},
                              .lines = {}};
     if (with_spectrum_) {
-      LineList found =
-          find_lines(spectrum_, c, campaign_.daq.sample_rate_hz, campaign_.rig.nominal_speed_rpm / 60);
+      LineList found = find_lines(spectrum_, c, campaign_.daq.sample_rate_hz,
+                                  campaign_.rig.nominal_speed_rpm / 60, campaign_.rig.blades);
       result.lines = std::move(found.lines);
       if (found.shaft_hz > 0) result.shaft_hz = found.shaft_hz;
     }

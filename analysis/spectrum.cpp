@@ -200,19 +200,19 @@ struct Origin {
   double rarity;  // −ln of how common it is beside the others
 };
 
-std::vector<Origin> origins(double shaft_hz, double rate_hz, double bin_hz) {
+std::vector<Origin> origins(double shaft_hz, double rate_hz, double bin_hz, int blades) {
   constexpr double kError_bins = 0.3, kGrid_Hz = 0.05;
   constexpr double kOvertone = 1, kAlias = 3, kHarmonic = 0.5;
   const double error_hz = kError_bins * bin_hz;
   std::vector<Origin> result;
   for (int k = 1; shaft_hz > 0 && k <= 16; ++k) {
     const bool alias = k * shaft_hz > rate_hz / 2;
-    const std::string base = k == 1 ? "shaft" : k == 2 ? "blade_pass" : fmt::format("shaft_x{}", k);
+    const std::string base = k == 1 ? "shaft" : k == blades ? "blade_pass" : fmt::format("shaft_x{}", k);
     result.push_back({alias ? base + "_alias" : base, folded(k * shaft_hz, rate_hz),
                       std::hypot(1, k) * error_hz,
-                      alias   ? kAlias
-                      : k > 2 ? kOvertone
-                              : 0});
+                      alias                   ? kAlias
+                      : k == 1 || k == blades ? 0
+                                              : kOvertone});
   }
   for (const int mains : {50, 60})
     for (int k = 1; k <= 5; ++k)
@@ -240,7 +240,7 @@ std::string name_of_line(double frequency_hz, const std::vector<Origin>& known, 
 }  // namespace
 
 LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double rate_hz,
-                    double expected_shaft_hz) {
+                    double expected_shaft_hz, int blades) {
   LineList list;
   if (spectrum.segments() == 0) return list;
   const double bin_hz = rate_hz / static_cast<double>(spectrum.window());
@@ -251,7 +251,7 @@ LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double r
     break;
   }
   if (list.lines.size() > kMostLines) list.lines.resize(kMostLines);
-  const std::vector<Origin> known = origins(list.shaft_hz, rate_hz, bin_hz);
+  const std::vector<Origin> known = origins(list.shaft_hz, rate_hz, bin_hz, blades);
   for (SpectralLine& line : list.lines)
     line.name =
         line.frequency_hz == list.shaft_hz ? "shaft" : name_of_line(line.frequency_hz, known, 1.5 * bin_hz);

@@ -45,14 +45,14 @@ class WelchSpectrum {
 };
 
 /// The shaft's line: the strongest within 4 % of where it is expected, if it stands out.
-/// The lines of a spectrum, strongest first, at most twelve; named after the shaft (shaft, blade_pass = twice
-/// the shaft of a two-bladed propeller, shaft_x3 …, with _alias beyond the Nyquist frequency) or the mains
-/// (mains_50 …).
+/// The lines of a spectrum, strongest first, at most twelve; named after the shaft (shaft, blade_pass =
+/// as many times the shaft as a propeller has blades, shaft_x3 …, with _alias beyond the Nyquist frequency)
+/// or the mains (mains_50 …).
 struct LineList {
   std::vector<SpectralLine> lines;
   double shaft_hz = 0;  // 0: none found
 };
 LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double rate_hz,
-                    double expected_shaft_hz);
+                    double expected_shaft_hz, int blades);
 
 }  // namespace tunnelrig

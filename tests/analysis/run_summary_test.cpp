@@ -208,6 +208,24 @@ TEST(RunSummary, LinesAreFoundNamedAndMeasured) {
   EXPECT_NEAR(lines["shaft_x9_alias"].frequency_hz, kRate_hz - 9 * shaft_hz, 0.05);
 }
 
+TEST(RunSummary, ThreeBladesPassThreeTimesATurn) {
+  std::mt19937_64 engine(11);
+  std::normal_distribution<double> unit;
+  constexpr double kShaft_hz = 83.71;
+  CampaignInfo campaign = kCampaign;
+  campaign.rig.blades = 3;
+  const auto summarizer = make_run_summarizer(campaign, {SampleType::kFloat64, 4});
+  summarizer->frames(volts(40000, [&](std::size_t i, std::size_t) {
+    return 2 + 0.02 * unit(engine) + 0.1 * wave(kShaft_hz, i) + 0.02 * wave(2 * kShaft_hz, i) +
+           0.04 * wave(3 * kShaft_hz, i);
+  }));
+  std::map<std::string, double> lines_V;
+  for (const SpectralLine& line : summarizer->finish("hash").channels[0].lines)
+    lines_V[line.name] = line.amplitude_V;
+  EXPECT_NEAR(lines_V["blade_pass"], 0.04, 0.002);
+  EXPECT_NEAR(lines_V["shaft_x2"], 0.02, 0.002);
+}
+
 /// Of a run of a second: the thirteenth multiple of 201.3 Hz would appear at 50 Hz, but the mains are there.
 TEST(RunSummary, AHumIsNoAliasOfAFastShaft) {
   std::mt19937_64 engine(10);
