@@ -50,9 +50,10 @@ double median_of(std::vector<double> values) {
 
 void finish_group(TableReduction& reduction, TableGroup& group) {
   constexpr double kDoubtful = 3;
-  std::sort(group.rows.begin(), group.rows.end(), [&](std::size_t a, std::size_t b) {
-    return reduction.rows[a].speed_rpm < reduction.rows[b].speed_rpm;
-  });
+  const auto speed = [&](std::size_t row) { return reduction.rows[row].speed_rpm; };
+  const auto known_end = std::partition(group.rows.begin(), group.rows.end(),
+                                        [&](std::size_t row) { return !std::isnan(speed(row)); });
+  std::sort(group.rows.begin(), known_end, [&](std::size_t a, std::size_t b) { return speed(a) < speed(b); });
   std::vector<double> c_t;
   for (const std::size_t row : group.rows) c_t.push_back(reduction.rows[row].c_t);
   group.median = median_of(c_t);
@@ -62,10 +63,12 @@ void finish_group(TableReduction& reduction, TableGroup& group) {
   }
   for (double& value : c_t) value = std::abs(value - group.median);
   group.spread = 1.4826 * median_of(c_t);
-  group.lowest_speed_rpm = reduction.rows[group.rows.front()].speed_rpm;
-  group.highest_speed_rpm = reduction.rows[group.rows.back()].speed_rpm;
-  group.at_lowest = reduction.rows[group.rows.front()].c_t;
-  group.at_highest = reduction.rows[group.rows.back()].c_t;
+  if (known_end == group.rows.begin()) return;
+  const TableRow &lowest = reduction.rows[group.rows.front()], &highest = reduction.rows[*(known_end - 1)];
+  group.lowest_speed_rpm = lowest.speed_rpm;
+  group.highest_speed_rpm = highest.speed_rpm;
+  group.at_lowest = lowest.c_t;
+  group.at_highest = highest.c_t;
 }
 
 /// Many groups get thin lines of one colour and no legend; a handful get a legend.
@@ -83,12 +86,14 @@ std::string plot_script(const TableReduction& reduction, const std::string& term
       legend ? "set key outside right noenhanced" : "unset key", pulls ? "*" : "0");
   std::string data;
   for (std::size_t g = 0; g < reduction.groups.size(); ++g) {
-    script +=
-        fmt::format("{}'-' using 1:2 with linespoints pt 7 ps 0.4 lw {} {} title {}", g == 0 ? "" : ", ",
-                    legend ? "1.5" : "0.7", legend ? fmt::format("lt {}", g + 1) : "lc rgb '#800072b2'",
-                    gnuplot_text(reduction.groups[g].name));
+    if (std::isnan(reduction.groups[g].lowest_speed_rpm)) continue;
+    script += fmt::format("{}'-' using 1:2 with linespoints pt 7 ps 0.4 lw {} {} title {}",
+                          data.empty() ? "" : ", ", legend ? "1.5" : "0.7",
+                          legend ? fmt::format("lt {}", g + 1) : "lc rgb '#800072b2'",
+                          gnuplot_text(reduction.groups[g].name));
     for (const std::size_t row : reduction.groups[g].rows)
-      data += fmt::format("{} {}\n", reduction.rows[row].speed_rpm, reduction.rows[row].c_t);
+      if (!std::isnan(reduction.rows[row].speed_rpm))
+        data += fmt::format("{} {}\n", reduction.rows[row].speed_rpm, reduction.rows[row].c_t);
     data += "e\n";
   }
   return script + "\n" + data + "unset output\n";
@@ -121,7 +126,7 @@ TableReduction reduce_table_rows(const ObservationTable& table, Convention conve
     const auto [found, fresh] = groups.emplace(row.group, reduction.groups.size());
     if (fresh) reduction.groups.push_back({.name = row.group, .rows = {}});
     reduction.groups[found->second].rows.push_back(reduction.rows.size());
-    reduction.rows.push_back({i, row.group, row.speed_rpm.value_or(0), *c_t, row.place});
+    reduction.rows.push_back({i, row.group, row.speed_rpm.value_or(kNotKnown), *c_t, row.place});
   }
   if (reduction.rows.empty()) {
     throw InputError::in(table.schema.file,
@@ -135,9 +140,10 @@ TableReduction reduce_table_rows(const ObservationTable& table, Convention conve
 std::string observations_csv(const TableReduction& reduction) {
   Sheet sheet{.file = "", .columns = {"group", "row", "speed_rpm", "c_t", "convention"}, .rows = {}};
   for (const TableRow& row : reduction.rows) {
-    sheet.rows.push_back({{row.group, row.place, fmt::format("{:.6g}", row.speed_rpm),
-                           fmt::format("{:.8g}", row.c_t), std::string(name_of(reduction.convention))},
-                          0});
+    sheet.rows.push_back(
+        {{row.group, row.place, std::isnan(row.speed_rpm) ? "" : fmt::format("{:.6g}", row.speed_rpm),
+          fmt::format("{:.8g}", row.c_t), std::string(name_of(reduction.convention))},
+         0});
   }
   return format_csv(sheet);
 }
@@ -163,6 +169,9 @@ std::optional<std::string> draw_coefficients(const TableReduction& reduction,
                                              const std::filesystem::path& picture) {
   const std::string extension = picture.extension().string();
   if (extension != ".svg" && extension != ".png") return "write a name that ends in .svg or .png";
+  if (std::all_of(reduction.rows.begin(), reduction.rows.end(),
+                  [](const TableRow& row) { return std::isnan(row.speed_rpm); }))
+    return "no row has a speed that C_T could be drawn against";
   const std::filesystem::path folder =
       picture.has_parent_path() ? picture.parent_path() : std::filesystem::path(".");
   const std::string terminal = extension == ".svg"

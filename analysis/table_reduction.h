@@ -5,27 +5,30 @@
 #include "datasets/observations.h"
 
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace tunnelrig {
 
+inline constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+
 struct TableRow {
   std::size_t observation = 0;  // index in ObservationTable::rows
   std::string group;
-  double speed_rpm = 0;
+  double speed_rpm = kNotKnown;
   double c_t = 0;
   std::string place;  // file and line
 };
 
 struct TableGroup {
   std::string name;
-  std::vector<std::size_t> rows;  // indices in TableReduction::rows, by speed
-  double lowest_speed_rpm = 0, highest_speed_rpm = 0;
+  std::vector<std::size_t> rows;  // indices in TableReduction::rows, by speed; those without one are last
+  double lowest_speed_rpm = kNotKnown, highest_speed_rpm = kNotKnown;
   double median = 0;
-  double spread = 0;                     // 1.4826 times the median absolute deviation: σ of a normal scatter
-  double at_lowest = 0, at_highest = 0;  // C_T at those speeds
+  double spread = 0;  // 1.4826 times the median absolute deviation: σ of a normal scatter
+  double at_lowest = kNotKnown, at_highest = kNotKnown;  // C_T at those speeds
 };
 
 struct TableReduction {

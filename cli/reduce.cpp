@@ -139,11 +139,13 @@ int reduce_campaign(const ReduceOptions& options, const CampaignFile& file) {
 void print_table(const TableReduction& reduction, Convention convention) {
   Table table({"group", "rows", "speed from [rpm]", "to [rpm]", "C_T median", "spread", "C_T at the lowest",
                "at the highest"});
+  const auto number = [](double value, int decimals) {
+    return std::isnan(value) ? "-" : fmt::format("{:.{}f}", value, decimals);
+  };
   for (const TableGroup& group : reduction.groups) {
-    table.add({group.name, fmt::format("{}", group.rows.size()),
-               fmt::format("{:.0f}", group.lowest_speed_rpm), fmt::format("{:.0f}", group.highest_speed_rpm),
-               fmt::format("{:.5f}", group.median), fmt::format("{:.5f}", group.spread),
-               fmt::format("{:.5f}", group.at_lowest), fmt::format("{:.5f}", group.at_highest)});
+    table.add({group.name, fmt::format("{}", group.rows.size()), number(group.lowest_speed_rpm, 0),
+               number(group.highest_speed_rpm, 0), number(group.median, 5), number(group.spread, 5),
+               number(group.at_lowest, 5), number(group.at_highest, 5)});
   }
   table.print();
   fmt::print("\n{} observations in {} groups; convention {}\n", reduction.rows.size(),

@@ -257,6 +257,23 @@ TEST_F(BadInput, OptionsThatTheFileCannotServe) {
               HasSubstr("--plot: draws a table of observations"));
 }
 
+/// The coefficient stands in the table, the speed was not written down.
+TEST_F(BadInput, ASpeedThatIsNotKnownIsNotZero) {
+  write_text(folder / "t.csv", "g,N,y\na,3000,0.1\na,,0.2\na,4000,0.11\nb,,0.3\n");
+  write_text(folder / "t.toml",
+             "format = \"tunnelrig-table/1\"\ngroups = [\"g\"]\n[response]\ncolumn = \"y\"\n"
+             "unit = \"1\"\nmeaning = \"c_t_propeller\"\n[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n");
+  const auto program = [&](const std::string& arguments) {
+    return test::run_program(folder.path(), arguments);
+  };
+  ASSERT_EQ(program("import t.csv --format table --schema t.toml --db t.db").code, 0);
+  const ProgramResult reduced = program("reduce --db t.db --csv o.csv --plot o.svg");
+  EXPECT_EQ(reduced.code, 0) << reduced.error;
+  EXPECT_THAT(reduced.out, testing::ContainsRegex("a +3 +3000 +4000 +0.11000 +0.01483 +0.10000 +0.11000"));
+  EXPECT_THAT(reduced.out, testing::ContainsRegex("b +1 +- +- +0.30000 +0.00000 +- +-"));
+  EXPECT_THAT(read_text(folder / "o.csv"), HasSubstr("a,t.csv:3,,0.2,propeller\n"));
+}
+
 /// gnuplot runs what stands in backquotes, if it stands in double quotes.
 TEST_F(BadInput, NamesInATableAreNoCommands) {
   write_text(folder / "t.csv",

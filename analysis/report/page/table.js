@@ -101,17 +101,23 @@ function sweepFigure(section) {
       'Thrust coefficient against speed', [], content, caption, command('reduce', '--csv coefficients.csv'));
 }
 
+/** Of the lowest or the highest speed that is known; rows without one stand behind the others. */
+const atEnd = ({speed_rpm: speeds}, values, highest) => {
+  const count = speeds.filter(known).length;
+  return count ? values[highest ? count - 1 : 0] : null;
+};
+
 const sweepTable = (groups) => table(
     'C_T by group',
     [
       {name: 'group', cell: (g) => g.group, text: true},
       {name: 'rows', cell: (g) => String(g.c_t.length)},
-      {name: 'speed from [rev/min]', cell: (g) => fixed(g.speed_rpm[0], 0)},
-      {name: 'to', cell: (g) => fixed(g.speed_rpm.at(-1), 0)},
+      {name: 'speed from [rev/min]', cell: (g) => fixed(atEnd(g, g.speed_rpm, false), 0)},
+      {name: 'to', cell: (g) => fixed(atEnd(g, g.speed_rpm, true), 0)},
       {name: 'C_T median', cell: (g) => fixed(g.median, 5)},
       {name: 'spread', cell: (g) => fixed(g.spread, 5)},
-      {name: 'at the lowest speed', cell: (g) => fixed(g.c_t[0], 5)},
-      {name: 'at the highest', cell: (g) => fixed(g.c_t.at(-1), 5)},
+      {name: 'at the lowest speed', cell: (g) => fixed(atEnd(g, g.c_t, false), 5)},
+      {name: 'at the highest', cell: (g) => fixed(atEnd(g, g.c_t, true), 5)},
     ],
     groups);
 
