@@ -29,6 +29,12 @@ void check(const PlanSettings& settings) {
                     settings.visits, settings.repeats));
   }
   if (settings.runs_per_session < 4) throw InputError("--runs-per-session: at least 4");
+  // Else sessions would be left over when each visit has one, and a session without a visit stands nowhere.
+  if (const int visit = 1 + (settings.repeats - 1) / settings.visits; visit > settings.runs_per_session)
+    throw InputError(fmt::format(
+        "--runs-per-session {}: a visit to a location is {} runs in a row (--repeats {}, --visits "
+        "{}) and belongs to one session",
+        settings.runs_per_session, visit, settings.repeats, settings.visits));
   if (!(settings.duration_s > 0)) throw InputError("--duration: seconds, above 0");
 }
 

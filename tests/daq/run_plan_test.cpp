@@ -85,6 +85,25 @@ TEST(Plan, ReadsWhatItWrites) {
   }
 }
 
+/// A session without a visit has no place for its tares.
+TEST(Plan, VisitsThatOutgrowASessionAreRefused) {
+  PlanSettings settings;
+  settings.tunnel = {{"OT", {}, {}}};
+  settings.repeats = 100;
+  EXPECT_THAT(message_of([&] { make_plan(settings); }),
+              HasSubstr("--runs-per-session 40: a visit to a location is 50 runs in a row (--repeats 100, "
+                        "--visits 2)"));
+  for (settings.repeats = 2; settings.repeats <= 30; ++settings.repeats)
+    for (settings.visits = 2; settings.visits <= settings.repeats; ++settings.visits)
+      for (settings.runs_per_session = 4; settings.runs_per_session < 20; ++settings.runs_per_session) {
+        if (settings.repeats > settings.visits * settings.runs_per_session) continue;
+        std::set<std::string> visited;
+        const auto plan = make_plan(settings);
+        for (const PlannedRun& run : plan) visited.insert(run.session);
+        EXPECT_EQ(visited.size(), static_cast<std::size_t>(settings.visits));
+      }
+}
+
 TEST(Plan, NamesWhatIsWrong) {
   const auto refuse = [](const std::string& csv) {
     return message_of([&] { parse_plan(parse_csv(csv, "plan.csv")); });
