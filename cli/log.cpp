@@ -59,7 +59,9 @@ int run_one(const LogOptions& options) {
 }
 
 int run_log(const LogOptions& options) {
-  if (!(options.duration_s > 0)) throw InputError("--duration: seconds, above 0");
+  if (!(options.duration_s > 0 && options.duration_s <= kLongestRun_s))
+    throw InputError(
+        fmt::format("--duration {:g}: seconds, above 0, at most {:g}", options.duration_s, kLongestRun_s));
   if (!options.listen.empty() && !options.live_port)
     throw InputError("--listen says from where the live page can be reached; it goes with --live");
   std::signal(SIGINT, stop_on_signal);

@@ -35,7 +35,9 @@ void check(const PlanSettings& settings) {
         "--runs-per-session {}: a visit to a location is {} runs in a row (--repeats {}, --visits "
         "{}) and belongs to one session",
         settings.runs_per_session, visit, settings.repeats, settings.visits));
-  if (!(settings.duration_s > 0)) throw InputError("--duration: seconds, above 0");
+  if (!(settings.duration_s > 0 && settings.duration_s <= kLongestRun_s))
+    throw InputError(
+        fmt::format("--duration {:g}: seconds, above 0, at most {:g}", settings.duration_s, kLongestRun_s));
 }
 
 /// Deals every location's visits out to as many different sessions, each time the emptiest ones, ties by
@@ -183,7 +185,7 @@ std::vector<PlannedRun> parse_plan(const Sheet& sheet) {
     run.kind = kind == "tare" ? RunKind::kTare : RunKind::kThrust;
     run.repeat = sheet.require_integer(row, "repeat", 0, std::numeric_limits<int>::max());
     run.duration_s = sheet.number(row, "duration_s").value_or(run.duration_s);
-    if (run.duration_s <= 0 || run.duration_s > 1e5) {
+    if (run.duration_s <= 0 || run.duration_s > kLongestRun_s) {
       throw InputError(
           fmt::format("{}: {:g} s is no duration of a run", sheet.where(row, "duration_s"), run.duration_s));
     }

@@ -11,6 +11,9 @@
 
 namespace tunnelrig {
 
+/// Beyond a day or so a duration is a slip of the pen, and its frames would outgrow their count.
+inline constexpr double kLongestRun_s = 1e5;
+
 struct PlannedRun {
   std::string session;
   RunKind kind = RunKind::kThrust;

@@ -199,6 +199,15 @@ TEST_F(BadInput, ConditionsThatNoSheetCanHold) {
               HasSubstr("--location: this is not UTF-8"));
 }
 
+/// The frames of such a run have no number that holds them.
+TEST_F(BadInput, DurationsOfNoRun) {
+  for (const char* duration : {"0", "2e5", "1e300", "inf"})
+    EXPECT_THAT(
+        refusal_of(
+            fmt::format("log --db c.db --location OT --session S1 --speed max --duration {}", duration), {}),
+        HasSubstr("seconds, above 0, at most 100000"));
+}
+
 TEST_F(BadInput, ALogThatFailsLeavesNoFile) {
   const std::string log = "log --db c.db --session S1 --duration 1 ";
   EXPECT_THAT(refusal_of(log + "--location OT --source tcp:localhost:1", {}), HasSubstr("cannot be opened"));

@@ -104,6 +104,12 @@ TEST(Plan, VisitsThatOutgrowASessionAreRefused) {
       }
 }
 
+TEST(Plan, DurationsAreThoseThatLogTakes) {
+  PlanSettings settings = thesis_plan();
+  settings.duration_s = 2e5;
+  EXPECT_THAT(message_of([&] { make_plan(settings); }), HasSubstr("--duration 200000: seconds, above 0"));
+}
+
 TEST(Plan, NamesWhatIsWrong) {
   const auto refuse = [](const std::string& csv) {
     return message_of([&] { parse_plan(parse_csv(csv, "plan.csv")); });
