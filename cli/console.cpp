@@ -57,9 +57,14 @@ std::string now_utc() {
 bool error_is_terminal() { return ::isatty(STDERR_FILENO) != 0; }
 bool input_is_terminal() { return ::isatty(STDIN_FILENO) != 0; }
 
+void tell(const std::string& text) {
+  std::fputs(text.c_str(), stderr);  // fmt::print would throw
+  std::fflush(stderr);
+}
+
 void warn(const std::string& text) {
   const bool colour = error_is_terminal();
-  fmt::print(stderr, "{}warning:{} {}\n", colour ? "\x1b[33m" : "", colour ? "\x1b[0m" : "", text);
+  tell(fmt::format("{}warning:{} {}\n", colour ? "\x1b[33m" : "", colour ? "\x1b[0m" : "", text));
 }
 
 std::size_t display_width(std::string_view text) {
@@ -98,7 +103,7 @@ void Table::print() const {
 }
 
 ProgressBar::~ProgressBar() {
-  if (drawn_ && error_is_terminal()) fmt::print(stderr, "\r\x1b[K");
+  if (drawn_ && error_is_terminal()) tell("\r\x1b[K");
 }
 
 void ProgressBar::show(double done, double total, const std::string& note) {
@@ -114,12 +119,10 @@ void ProgressBar::show(double done, double total, const std::string& note) {
   const std::string left =
       fraction > 0.01 ? duration_text(elapsed_s / fraction * (1 - fraction)) + " left" : "";
   if (terminal) {
-    fmt::print(stderr, "\r\x1b[K{} {} {:3.0f} %  {}  {}", what_, bar_of(fraction), 100 * fraction, left,
-               note);
+    tell(fmt::format("\r\x1b[K{} {} {:3.0f} %  {}  {}", what_, bar_of(fraction), 100 * fraction, left, note));
   } else {
-    fmt::print(stderr, "{} {:.0f} %  {}  {}\n", what_, 100 * fraction, left, note);
+    tell(fmt::format("{} {:.0f} %  {}  {}\n", what_, 100 * fraction, left, note));
   }
-  std::fflush(stderr);
 }
 
 std::string duration_text(double seconds) {

@@ -23,6 +23,10 @@ std::string now_utc();
 bool error_is_terminal();
 bool input_is_terminal();
 
+/// On standard error, where that can be written: a log on a full disk or a terminal that is gone must not end
+/// a recording.
+void tell(const std::string& text);
+
 /// A line on standard error: "warning: …", coloured on a terminal.
 void warn(const std::string& text);
 

@@ -51,11 +51,10 @@ class Demo {
 
   int run() {
     const std::string db = path("campaign.db"), plan = path("plan.csv"), report = path("report.html");
-    fmt::print(
-        stderr,
+    tell(fmt::format(
         "The thesis's campaign on the virtual rig (simulated): 42 tunnel locations, OS, GND and CEIL, ten "
         "runs of {} s each.\n",
-        duration_);
+        duration_));
     int code = step({"plan", "--out", plan, "--duration", duration_});
     if (code == kWell)
       code = record({"log", "--db", db, "--plan", plan, "--source", "virtual", "--speed", "max"});

@@ -78,7 +78,7 @@ void adopt_and_store(const ExplainOptions& options, const Observations& observat
   Adoption adoption = adopt(observations, explanation, options.adopt_empirical);
   for (const std::string& note : adoption.notes) warn(note);
   if (!adoption.model) {
-    fmt::print(stderr, "nothing was adopted: the model stays as it is\n");
+    tell("nothing was adopted: the model stays as it is\n");
     return;
   }
   CampaignFile file(options.db, CampaignFile::Access::kWrite);
@@ -86,8 +86,8 @@ void adopt_and_store(const ExplainOptions& options, const Observations& observat
   const nlohmann::json inputs{{"calibration", certificate ? certificate->id : 0}};
   adoption.model->version =
       store_model(file, *adoption.model, {program_version(), arguments(), inputs.dump()});
-  fmt::print(stderr, "stored as model {}; reduce, map and report go by it from now on\n",
-             adoption.model->name());
+  tell(fmt::format("stored as model {}; reduce, map and report go by it from now on\n",
+                   adoption.model->name()));
 }
 
 int run_explain(ExplainOptions options) {

@@ -20,7 +20,7 @@ namespace {
 
 int report(const std::string& text, int code) {
   const bool colour = error_is_terminal();
-  fmt::print(stderr, "{}tunnelrig:{} {}\n", colour ? "\x1b[31m" : "", colour ? "\x1b[0m" : "", text);
+  tell(fmt::format("{}tunnelrig:{} {}\n", colour ? "\x1b[31m" : "", colour ? "\x1b[0m" : "", text));
   return code;
 }
 

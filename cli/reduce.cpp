@@ -47,7 +47,7 @@ bool refresh_from_raw(const ReduceOptions& options, CampaignData& data) {
     file.atomically([&] {
       for (const auto& [run, statistics] : computed) store_statistics(file, data.raw.at(run).id, statistics);
     });
-    fmt::print(stderr, "{}: the statistics of {} runs were stored anew\n", options.db, computed.size());
+    tell(fmt::format("{}: the statistics of {} runs were stored anew\n", options.db, computed.size()));
   }
   for (const auto& [run, statistics] : computed) data.statistics[run] = statistics;
   return lines.empty();

@@ -2,6 +2,7 @@
 // asked for, an exit code, nothing left behind.
 #include "cli/program.h"
 #include "datasets/csv.h"
+#include "datasets/raw_store.h"
 #include "support/example_campaign.h"
 #include "support/temporary_folder.h"
 
@@ -68,6 +69,22 @@ TEST_F(FailedWrites, OfAnExportNameTheTarget) {
       test::run_program(folder.path(), "export --db c.db --format csv a/b/out", kLittleRoom);
   EXPECT_EQ(above.code, 2);
   EXPECT_FALSE(fs::exists(folder / "a"));
+}
+
+/// A recording's log may lie on the disk that is full, or go to a terminal that is gone.
+TEST_F(FailedWrites, OfWhatIsSaidOnStandardErrorEndNothing) {
+  const auto code_of = [&](const std::string& arguments) {
+    const int status = std::system(  // NOLINT(concurrency-mt-unsafe)
+        fmt::format("cd '{}' && '{}' {}", folder.path().string(), TUNNELRIG_PROGRAM, arguments).c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  for (const std::string where : {"/dev/full", "&-"}) {
+    EXPECT_EQ(code_of("plan --repeats 1 2>" + where), 2) << where;
+    EXPECT_EQ(code_of("log --db c.db --location OT --session S1 --duration 2.5 >/dev/null 2>" + where), 0)
+        << "2.5 s are long enough for a line of progress: " << where;
+  }
+  const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+  for (const RawRun& run : raw_runs(file)) EXPECT_EQ(run.state, RunState::kComplete);
 }
 
 TEST_F(FailedWrites, OfAFlightLeaveNoEmptyFolder) {
