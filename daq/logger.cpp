@@ -51,8 +51,7 @@ class Reader {
     do {
       if (reopen_.exchange(false)) source_.reopen();
       result = source_.read(buffer, kReadTimeout);
-      if (result.status == ReadResult::Status::kBroken && !source_.reopen())
-        std::this_thread::sleep_for(kReopenPause);
+      if (result.status == ReadResult::Status::kBroken) get_back();
     } while (queue_.push({result.status,
                           result.time_s,
                           {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(result.size)},
@@ -60,9 +59,18 @@ class Reader {
              result.status != ReadResult::Status::kEnd);
   }
 
+  /// At once where it broke after a while; a peer that hangs up whenever it is called, or a device that is
+  /// gone, is not asked all the time.
+  void get_back() {
+    std::this_thread::sleep_until(next_try_);
+    next_try_ = Clock::now() + kReopenPause;
+    source_.reopen();
+  }
+
   PacketSource& source_;
   BlockQueue& queue_;
   std::atomic<bool> reopen_{false};
+  Clock::time_point next_try_{};
   std::thread thread_;
 };
 

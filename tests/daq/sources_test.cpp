@@ -1,6 +1,7 @@
 // TCP and serial against real sockets and a real terminal; a peer that hangs up, and one that falls silent.
 #include "daq/logging.h"
 #include "daq/packets.h"
+#include "daq/tcp_server.h"
 #include "datasets/error.h"
 #include "support/message_of.h"
 
@@ -8,40 +9,12 @@
 #include <fstream>
 #include <thread>
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <pty.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 namespace tunnelrig {
 namespace {
-
-/// A board on a TCP port of this machine.
-class Server {
- public:
-  Server() : listener_(::socket(AF_INET, SOCK_STREAM, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    EXPECT_EQ(::bind(listener_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    EXPECT_EQ(::listen(listener_, 4), 0);
-    socklen_t length = sizeof address;
-    ::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &length);
-    port_ = ntohs(address.sin_port);
-  }
-  ~Server() { ::close(listener_); }
-  Server(const Server&) = delete;
-  Server& operator=(const Server&) = delete;
-
-  int accept() const { return ::accept(listener_, nullptr, nullptr); }
-  std::string name() const { return "tcp:127.0.0.1:" + std::to_string(port_); }
-
- private:
-  int listener_;
-  int port_ = 0;
-};
 
 /// Sends frames [from, to) in packets of 16, at the pace of the rig where asked.
 void send_frames(int fd, std::uint64_t from, std::uint64_t to, bool paced) {
@@ -55,7 +28,7 @@ void send_frames(int fd, std::uint64_t from, std::uint64_t to, bool paced) {
 TEST(Tcp, AHangUpIsAGapAndTheRunGoesOn) {
   const test::TemporaryFolder folder;
   CampaignFile file = test::new_campaign(folder / "c.db");
-  const Server server;
+  const test::Server server;
   std::thread board([&] {
     const int first = server.accept();
     send_frames(first, 0, 800, true);
@@ -77,7 +50,7 @@ TEST(Tcp, AHangUpIsAGapAndTheRunGoesOn) {
 TEST(Tcp, SilenceIsNoticedAndTheSourceReopened) {
   const test::TemporaryFolder folder;
   CampaignFile file = test::new_campaign(folder / "c.db");
-  const Server server;
+  const test::Server server;
   std::thread board([&] {
     const int first = server.accept();
     send_frames(first, 0, 160, true);
@@ -96,6 +69,27 @@ TEST(Tcp, SilenceIsNoticedAndTheSourceReopened) {
   EXPECT_EQ(outcome.ledger.silences, 1u);
   EXPECT_EQ(outcome.ledger.frames_lost, 0u);
   EXPECT_EQ(outcome.state, RunState::kComplete);
+}
+
+/// A bridge that is in use answers so. It is called a few times a second, not as often as it hangs up.
+TEST(Tcp, APeerThatHangsUpIsNotCalledAllTheTime) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  const test::Server server;
+  std::atomic<bool> ended{false};
+  int calls = 0;
+  std::thread peer([&] {
+    for (; !ended; ++calls) ::close(server.accept());
+  });
+  const auto source = open_source(server.name());
+  const LogOutcome outcome =
+      log_run(*source, file, test::cells("R1"), {.duration_s = 1, .silence_s = 5, .give_up_s = 1},
+              test::summarizer(), {}, test::never_stop());
+  ended = true;
+  open_source(server.name());
+  peer.join();
+  EXPECT_EQ(outcome.ledger.end_reason, "no frame for 1 s");
+  EXPECT_LE(calls, 10);
 }
 
 TEST(Serial, ReadsARawTerminal) {
