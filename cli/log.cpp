@@ -9,13 +9,25 @@
 #include <memory>
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
 namespace tunnelrig::cli {
 namespace {
 
+constexpr int kWait_ms = 100;
+
 void stop_on_signal(int /*signal*/) {
   stop_requested = true;
   quit_requested = true;
+}
+
+/// False where a signal asks to stop: a read would go on waiting.
+bool wait_for_input() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  while (!stop_requested)
+    if (::poll(&input, 1, kWait_ms) > 0) return true;
+  return false;
 }
 
 /// Asks the operator to bring the rig to the next run. False: stop here.
@@ -28,7 +40,7 @@ bool ask_operator(const PlannedRun& planned, const PlannedRun* previous) {
              planned.location);
   std::fflush(stdout);
   std::string answer;
-  return std::getline(std::cin, answer) && answer != "q";
+  return wait_for_input() && std::getline(std::cin, answer) && answer != "q";
 }
 
 int run_plan(const LogOptions& options) {

@@ -1,0 +1,126 @@
+// `log --plan` at a terminal, between two runs: the operator moves the rig while the board goes on sending.
+#include "cli/program.h"
+#include "daq/packets.h"
+#include "daq/tcp_server.h"
+#include "datasets/csv.h"
+#include "datasets/raw_store.h"
+#include "support/temporary_folder.h"
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <pty.h>
+#include <sys/wait.h>
+
+namespace tunnelrig {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// A board that samples at the rig's rate, whoever reads.
+class Board {
+ public:
+  Board() : thread_([this] { run(); }) {}
+  ~Board() {
+    ended_ = true;
+    thread_.join();
+  }
+  Board(const Board&) = delete;
+  Board& operator=(const Board&) = delete;
+
+  std::string name() const { return server_.name(); }
+  std::uint64_t sent() const { return sent_; }
+
+ private:
+  void run() {
+    const int fd = server_.accept();
+    for (auto due = Clock::now(); !ended_; due += std::chrono::milliseconds(12)) {
+      std::this_thread::sleep_until(due);
+      const auto bytes = test::packet_bytes({.first = sent_, .ticks_per_frame = 63000});
+      ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+      sent_ += 16;
+    }
+    ::close(fd);
+  }
+
+  test::Server server_;
+  std::atomic<std::uint64_t> sent_{0};
+  std::atomic<bool> ended_{false};
+  std::thread thread_;
+};
+
+/// `log --plan` of one run, on a terminal of its own.
+class Terminal {
+ public:
+  Terminal(const std::filesystem::path& folder, const std::string& source) {
+    write_text(folder / "plan.csv", "session,location,repeat,duration_s\nS1,OT,1,0.2\n");
+    pid_ = ::forkpty(&fd_, nullptr, nullptr, nullptr);
+    if (pid_ != 0) return;
+    if (::chdir(folder.c_str()) == 0)
+      ::execl(TUNNELRIG_PROGRAM, TUNNELRIG_PROGRAM, "log", "--db", "c.db", "--plan", "plan.csv", "--source",
+              source.c_str(), nullptr);
+    ::_exit(127);
+  }
+  ~Terminal() {
+    if (pid_ > 0) {
+      ::kill(pid_, SIGKILL);
+      ::waitpid(pid_, nullptr, 0);
+    }
+    ::close(fd_);
+  }
+  Terminal(const Terminal&) = delete;
+  Terminal& operator=(const Terminal&) = delete;
+
+  bool shows(const std::string& text) {
+    return until([&] { return shown_.find(text) != std::string::npos; });
+  }
+  void type(const std::string& keys) {
+    ASSERT_EQ(::write(fd_, keys.data(), keys.size()), static_cast<ssize_t>(keys.size()));
+  }
+  /// The exit code; -1 where it does not end.
+  int ended() {
+    int status = 0;
+    if (!until([&] { return ::waitpid(pid_, &status, WNOHANG) == pid_; })) return -1;
+    pid_ = 0;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+ private:
+  template <typename Condition>
+  bool until(const Condition& condition) {
+    const auto deadline = Clock::now() + std::chrono::seconds(20);
+    while (!condition()) {
+      if (Clock::now() > deadline) return false;
+      pollfd output{fd_, POLLIN, 0};
+      std::array<char, 4096> text{};
+      const bool some = ::poll(&output, 1, 50) > 0;
+      const ssize_t size = some ? ::read(fd_, text.data(), text.size()) : 0;
+      if (size > 0) shown_.append(text.data(), static_cast<std::size_t>(size));
+    }
+    return true;
+  }
+
+  int fd_ = -1;
+  pid_t pid_ = -1;
+  std::string shown_;
+};
+
+TEST(Operator, CtrlCAtTheQuestionEndsThereWithoutARun) {
+  const test::TemporaryFolder folder;
+  const Board board;
+  Terminal terminal(folder.path(), board.name());
+  ASSERT_TRUE(terminal.shows("Enter when ready"));
+  terminal.type("\x03");
+  EXPECT_EQ(terminal.ended(), 0);
+  const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+  EXPECT_THAT(raw_runs(file), testing::IsEmpty());
+}
+
+}  // namespace
+}  // namespace tunnelrig
