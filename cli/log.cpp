@@ -15,7 +15,7 @@
 namespace tunnelrig::cli {
 namespace {
 
-constexpr int kWait_ms = 100;
+constexpr int kIdle_ms = 100;
 
 void stop_on_signal(int /*signal*/) {
   stop_requested = true;
@@ -23,15 +23,17 @@ void stop_on_signal(int /*signal*/) {
 }
 
 /// False where a signal asks to stop: a read would go on waiting.
-bool wait_for_input() {
+bool wait_for_input(Logging& logging) {
   pollfd input{STDIN_FILENO, POLLIN, 0};
-  while (!stop_requested)
-    if (::poll(&input, 1, kWait_ms) > 0) return true;
+  while (!stop_requested) {
+    if (::poll(&input, 1, kIdle_ms) > 0) return true;
+    logging.idle();
+  }
   return false;
 }
 
 /// Asks the operator to bring the rig to the next run. False: stop here.
-bool ask_operator(const PlannedRun& planned, const PlannedRun* previous) {
+bool ask_operator(Logging& logging, const PlannedRun& planned, const PlannedRun* previous) {
   const bool moved = previous == nullptr || previous->location != planned.location ||
                      previous->kind != planned.kind || previous->session != planned.session;
   if (!moved) return true;
@@ -40,7 +42,7 @@ bool ask_operator(const PlannedRun& planned, const PlannedRun* previous) {
              planned.location);
   std::fflush(stdout);
   std::string answer;
-  return wait_for_input() && std::getline(std::cin, answer) && answer != "q";
+  return wait_for_input(logging) && std::getline(std::cin, answer) && answer != "q";
 }
 
 int run_plan(const LogOptions& options) {
@@ -51,7 +53,7 @@ int run_plan(const LogOptions& options) {
   const bool ask = !options.yes && !logging.is_virtual() && input_is_terminal();
   int code = kWell;
   for (std::size_t i = 0; i < left.size() && !stop_requested; ++i) {
-    if (ask && !ask_operator(left[i], i > 0 ? &left[i - 1] : nullptr)) break;
+    if (ask && !ask_operator(logging, left[i], i > 0 ? &left[i - 1] : nullptr)) break;
     const std::string note = fmt::format("{}/{}", plan.size() - left.size() + i + 1, plan.size());
     code = std::max(code, logging.record(left[i], note));
   }

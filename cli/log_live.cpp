@@ -58,6 +58,7 @@ class LiveLogging {
       }
       place(!left_.empty() ? Phase::kWaiting : plan_.empty() ? Phase::kIdle : Phase::kFinished);
       if (left_.empty() && options_.yes) break;
+      logging_.idle();
       if (const auto order = page_.desk().wait(std::chrono::milliseconds(100))) carry_out(*order);
     }
     return code_;

@@ -73,6 +73,11 @@ class Logging {
   /// Records one run; the exit code. `note` stands beside the progress bar.
   int record(const PlannedRun& planned, const std::string& note, const LogWatch& watch = {});
 
+  /// To be called while a person is waited for: what the board sends meanwhile is none of the next run's.
+  void idle() {
+    if (source_) source_->idle();
+  }
+
   /// What the instruments read, from the next run on, in place of the options'.
   LogOptions& options() { return options_; }
 

@@ -49,6 +49,13 @@ class DescriptorSource : public PacketSource {
     return {ReadResult::Status::kBroken, 0, steady_seconds()};
   }
 
+  /// At most a megabyte, so that a peer that sends without end holds nobody up.
+  void idle() override {
+    std::array<std::byte, 4096> unwanted;
+    for (int i = 0; i < 256; ++i)
+      if (read(unwanted, std::chrono::milliseconds(0)).status != ReadResult::Status::kData) return;
+  }
+
   bool reopen() override {
     close();
     std::string why;

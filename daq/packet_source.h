@@ -34,6 +34,10 @@ class PacketSource {
   /// A run begins: what waits from before may be thrown away.
   virtual void begin_run() {}
 
+  /// Nobody records, and this is called several times a second meanwhile: what has come since is thrown away,
+  /// or the next run would begin with it. Does not wait.
+  virtual void idle() {}
+
   /// Waits for bytes, at most for `timeout`. Never throws for what a device or a cable does.
   virtual ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds timeout) = 0;
 

@@ -111,6 +111,23 @@ class Terminal {
   std::string shown_;
 };
 
+TEST(Operator, WhatCameWhileTheRigWasMovedIsNoPartOfTheRun) {
+  const test::TemporaryFolder folder;
+  const Board board;
+  Terminal terminal(folder.path(), board.name());
+  ASSERT_TRUE(terminal.shows("Enter when ready"));
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  const std::uint64_t ready = board.sent();
+  terminal.type("\n");
+  ASSERT_NE(terminal.ended(), -1);
+  const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+  const auto ledger = ledger_of(file, raw_run(file, "R0001").value().id).value();
+  EXPECT_GT(ready, 1600u);
+  EXPECT_GT(ledger.first_sequence + 800, ready)
+      << "at most a tenth of a second, and what a busy machine adds";
+  EXPECT_EQ(ledger.frames_lost, 0u);
+}
+
 TEST(Operator, CtrlCAtTheQuestionEndsThereWithoutARun) {
   const test::TemporaryFolder folder;
   const Board board;

@@ -71,6 +71,23 @@ TEST(Tcp, SilenceIsNoticedAndTheSourceReopened) {
   EXPECT_EQ(outcome.state, RunState::kComplete);
 }
 
+TEST(Tcp, WhatCameWhileNobodyRecordedIsNoPartOfTheRun) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  const test::Server server;
+  const auto source = open_source(server.name());
+  const int board = server.accept();
+  send_frames(board, 0, 1600, false);
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  source->idle();
+  send_frames(board, 1600, 3200, false);
+  const LogOutcome outcome = log_run(*source, file, test::cells("R1"), {.duration_s = 1}, test::summarizer(),
+                                     {}, test::never_stop());
+  ::close(board);
+  EXPECT_EQ(outcome.ledger.first_sequence, 1600u);
+  EXPECT_EQ(outcome.ledger.bytes_skipped, 0u);
+}
+
 /// A bridge that is in use answers so. It is called a few times a second, not as often as it hangs up.
 TEST(Tcp, APeerThatHangsUpIsNotCalledAllTheTime) {
   const test::TemporaryFolder folder;
