@@ -3,6 +3,7 @@
 #include "datasets/error.h"
 
 #include <algorithm>
+#include <cctype>
 #include <map>
 
 namespace tunnelrig {
@@ -10,12 +11,20 @@ namespace {
 
 constexpr std::string_view kMessage = "App message";  // in the program's own words, commas and all
 
+/// In capitals as well: a sweep that is passed over would not be missed.
+bool is_csv(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".csv";
+}
+
 std::vector<std::filesystem::path> sweep_files(const std::filesystem::path& source) {
   std::vector<std::filesystem::path> files;
   std::error_code error;
   if (!std::filesystem::is_directory(source, error)) return {source};
   for (const auto& entry : std::filesystem::directory_iterator(source)) {
-    if (entry.path().extension() == ".csv") files.push_back(entry.path());
+    if (is_csv(entry.path())) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
   if (files.empty()) throw InputError::in(source.string(), "holds no .csv file");
@@ -120,8 +129,21 @@ std::optional<std::string> common_speed(Sheet& all, const std::vector<SweepColum
   return name;
 }
 
+/// A text as TOML writes it: names of files and columns may hold quotes and backslashes.
+std::string toml_text(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (const auto code = static_cast<unsigned char>(c); code < 0x20 || code == 0x7F)
+      out += fmt::format("\\u{:04X}", code);
+    else
+      out += (c == '"' || c == '\\' ? "\\" : "") + std::string(1, c);
+  }
+  return out + "\"";
+}
+
 std::string column_toml(std::string_view section, const std::string& column, std::string_view meaning) {
-  return fmt::format("\n{}\ncolumn = \"{}\"\nunit = \"{}\"\n{}", section, column, unit_in_header(column),
+  return fmt::format("\n{}\ncolumn = {}\nunit = {}\n{}", section, toml_text(column),
+                     toml_text(unit_in_header(column)),
                      meaning.empty() ? "" : fmt::format("meaning = \"{}\"\n", meaning));
 }
 
@@ -133,8 +155,9 @@ std::string sweep_schema(Sheet& all, const std::vector<SweepColumns>& sweeps, co
   check_thrust(*thrust, sweeps);
   const auto speed = common_speed(all, sweeps, options);
   const std::string group = all.find("group") ? "group" : "file";
-  std::string toml = fmt::format("format = \"{}\"\nname = \"{}\"\ngroups = [\"{}\"]\nblocks = \"file\"\n",
-                                 kTableFormat, std::filesystem::path(source).filename().string(), group);
+  std::string toml =
+      fmt::format("format = \"{}\"\nname = {}\ngroups = [\"{}\"]\nblocks = \"file\"\n", kTableFormat,
+                  toml_text(std::filesystem::path(source).filename().string()), group);
   toml += column_toml("[response]", *thrust, "thrust_N");
   if (speed) {
     toml += column_toml("[speed]", *speed, "");

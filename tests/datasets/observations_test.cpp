@@ -119,6 +119,24 @@ TEST(Rcbenchmark, TakesSpeedFromTheProbeThatWasThere) {
   EXPECT_NEAR(table.rows[1].response, 0.04 * 9.80665, 1e-12);
 }
 
+TEST(Rcbenchmark, NamesOfFilesAndColumnsAreAnyText) {
+  const test::TemporaryFolder folder;
+  for (const char* name : {"5\" x 3\".csv", "a\\x.csv", "tab\t.csv"}) {
+    write_text(folder / name, "Thrust (N),\"Voltage \"\"main\"\" (V)\"\n1,11\n2,12\n");
+    const auto table = read_rcbenchmark(folder / name, {});
+    EXPECT_EQ(table.schema.name, name);
+    ASSERT_EQ(table.schema.covariates.size(), 1u);
+    EXPECT_EQ(table.schema.covariates[0].column, "Voltage \"main\" (V)");
+  }
+}
+
+TEST(Rcbenchmark, AFileNamedInCapitalsIsASweepToo) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "in");
+  for (const char* name : {"in/a.csv", "in/B.CSV"}) write_text(folder / name, "Thrust (N)\n1\n2\n");
+  EXPECT_EQ(read_rcbenchmark(folder / "in", {}).rows.size(), 4u);
+}
+
 TEST(Rcbenchmark, EachFileHasTheSpeedOfItsOwnProbe) {
   const test::TemporaryFolder folder;
   std::filesystem::create_directory(folder / "in");
