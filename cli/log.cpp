@@ -46,6 +46,8 @@ bool ask_operator(Logging& logging, const PlannedRun& planned, const PlannedRun*
 }
 
 int run_plan(const LogOptions& options) {
+  if (!options.location.empty() || !options.session.empty())
+    throw InputError("--plan says where and when; --location and --session are for one run without it");
   const std::vector<PlannedRun> plan = parse_plan(read_csv(options.plan));
   Logging logging(options);
   const std::vector<PlannedRun> left = runs_left(logging.file(), plan);
@@ -113,7 +115,7 @@ void add_log(CLI::App& app, Work& work) {
   verb->add_option("--location", options->location, "Label of the location: H4V-2, OT, OS, GND1.25, …");
   verb->add_option("--repeat", options->repeat, "Number of the run at this location")->capture_default_str();
   verb->add_option("--session", options->session, "One set-up of the rig on one day");
-  verb->add_option("--duration", options->duration_s, "Seconds")->capture_default_str();
+  verb->add_option("--duration", options->duration_s, "Seconds; a plan has its own")->capture_default_str();
   verb->add_option("--kind", options->kind, "tare: motors stopped")
       ->check(CLI::IsMember({"thrust", "tare"}))
       ->capture_default_str();

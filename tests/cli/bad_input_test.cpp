@@ -199,6 +199,14 @@ TEST_F(BadInput, ConditionsThatNoSheetCanHold) {
               HasSubstr("--location: this is not UTF-8"));
 }
 
+/// A run at another place than was asked for would be found out much later.
+TEST_F(BadInput, APlanAndARun) {
+  write_text(folder / "plan.csv", "session,location,repeat\nS1,OT,1\n");
+  for (const char* option : {"--location H4V0", "--session S2"})
+    EXPECT_THAT(refusal_of(std::string("log --db c.db --plan plan.csv --speed max ") + option, {"plan.csv"}),
+                HasSubstr("--plan says where and when"));
+}
+
 /// The frames of such a run have no number that holds them.
 TEST_F(BadInput, DurationsOfNoRun) {
   for (const char* duration : {"0", "2e5", "1e300", "inf"})
