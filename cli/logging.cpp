@@ -70,6 +70,11 @@ const LogOptions& checked(const LogOptions& options) {
                                      {"--location", &options.location},
                                      {"--source", &options.source}})
     if (!is_utf8(*text)) throw InputError(fmt::format("{}: this is not UTF-8 text", option));
+  std::error_code error;
+  if (const std::string_view replay = "replay:";
+      options.source.starts_with(replay) &&
+      std::filesystem::equivalent(options.source.substr(replay.size()), options.capture, error))
+    throw InputError(fmt::format("--capture {}: this is what --source replays", options.capture));
   if (options.repeat < 0) throw InputError(fmt::format("--repeat: {} is below 0", options.repeat));
   for (const auto& [column, option, value] : kConditionOptions)
     if (const auto given = options.*value)

@@ -1,6 +1,7 @@
 // What `log` says of streams that are not as docs/wire-format.md wants them.
 #include "cli/program.h"
 #include "daq/packets.h"
+#include "datasets/csv.h"
 #include "support/temporary_folder.h"
 
 #include <fstream>
