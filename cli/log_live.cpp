@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -53,7 +54,9 @@ class LiveLogging {
     if (!options_.location.empty()) record(asked_on_the_command_line(), nullptr);
     while (!quit_requested) {
       if (!left_.empty() && may_go_on()) {
-        record(left_.front(), nullptr);
+        const PlannedRun next = left_.front();
+        record(next, nullptr);
+        if (options_.yes) have_tried(next);
         continue;
       }
       place(!left_.empty() ? Phase::kWaiting : plan_.empty() ? Phase::kIdle : Phase::kFinished);
@@ -79,6 +82,13 @@ class LiveLogging {
     const PlannedRun& next = left_.front();
     return complete_ && !here_.run.empty() && here_.location == next.location && here_.kind == next.kind &&
            here_.session == next.session;
+  }
+
+  /// With --yes a plan is walked once, as without a page: of a board that is dead every try would be partial.
+  void have_tried(const PlannedRun& run) {
+    const auto key = [](const PlannedRun& r) { return std::tie(r.session, r.kind, r.location, r.repeat); };
+    std::erase_if(plan_, [&](const PlannedRun& planned) { return key(planned) == key(run); });
+    left_ = runs_left(logging_.file(), plan_);
   }
 
   std::string session() const { return here_.session.empty() ? "S1" : here_.session; }

@@ -2,6 +2,7 @@
 #include "cli/program.h"
 #include "daq/packets.h"
 #include "datasets/csv.h"
+#include "datasets/raw_store.h"
 #include "support/temporary_folder.h"
 
 #include <fstream>
@@ -47,6 +48,27 @@ TEST_F(Streams, ARestartThatRepeatsItselfToTheBitIsNotSilent) {
   for (const std::uint64_t packets : {50u, 60u})
     for (std::uint64_t i = 0; i < packets; ++i) add({.first = 16 * i, .ticks_per_frame = 63000});
   EXPECT_THAT(log("0.65").error, HasSubstr("run R0001: 800 frames came under numbers that had passed"));
+}
+
+/// One try, as without a page; the limit is what a loop would run into.
+TEST_F(Streams, APlanThatNobodyWatchesOverADeadBoardEnds) {
+  std::ofstream(folder / "plan.csv") << "session,location,repeat,duration_s\nS1,OT,1,1\nS1,OT,2,1\n";
+  const std::string log = "log --db c.db --plan plan.csv --yes --speed max --faults stall=0:100000";
+  for (const std::string page : {"", " --live 0"}) {
+    const ProgramResult result = test::run_program(folder.path(), log + page, "ulimit -t 10");
+    EXPECT_EQ(result.code, 1) << page;
+    EXPECT_THAT(result.error, HasSubstr("is partial: no frame for 30 s")) << page;
+  }
+  const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+  EXPECT_EQ(raw_runs(file).size(), 4u);
+}
+
+TEST_F(Streams, WhatIsReplayedIsNotCapturedOverItself) {
+  for (std::uint64_t i = 0; i < 50; ++i) add({.first = 16 * i, .ticks_per_frame = 63000});
+  const ProgramResult result = log("0.6 --capture ./bytes");
+  EXPECT_EQ(result.code, 2);
+  EXPECT_THAT(result.error, HasSubstr("--capture ./bytes: this is what --source replays"));
+  EXPECT_EQ(read_text(folder / "bytes"), bytes);
 }
 
 TEST_F(Streams, RefusedPacketsAreSaidEvenWhereNothingIsLost) {
