@@ -2,6 +2,7 @@
 #include "cli/console.h"
 #include "cli/verb.h"
 #include "datasets/observations.h"
+#include "datasets/snapshot.h"
 
 #include <algorithm>
 #include <array>
@@ -23,6 +24,7 @@ constexpr std::array<const char*, 3> kNames = {"ok", "note", "problem"};
 constexpr std::array<const char*, 3> kColours = {"\x1b[32m", "\x1b[33m", "\x1b[31m"};
 
 std::vector<Finding> look_at(const CampaignFile& file) {
+  const Snapshot snapshot(file);  // a run that grows while it is looked at would seem damaged
   if (file.text("table.toml")) {
     const ObservationTable table = observations_of(file);
     const std::string problems = file.integrity_problems();

@@ -4,6 +4,7 @@
 #include "datasets/error.h"
 #include "datasets/import_doubts.h"
 #include "datasets/npy.h"
+#include "datasets/snapshot.h"
 #include "datasets/staged_output.h"
 #include "datasets/statistics_store.h"
 
@@ -340,6 +341,7 @@ ImportSummary import_campaign_folder(const fs::path& folder, const fs::path& fil
 }
 
 void export_campaign_folder(const CampaignFile& file, const fs::path& folder, const Progress& progress) {
+  const Snapshot snapshot(file);
   StagedOutput staged(folder, StagedOutput::Kind::kFolder);
   staged.write([&] { write_folder(file, staged.path(), progress); });
   staged.publish();

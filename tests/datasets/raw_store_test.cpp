@@ -1,6 +1,7 @@
 #include "datasets/raw_store.h"
 
 #include "datasets/error.h"
+#include "datasets/snapshot.h"
 #include "datasets/sqlite.h"
 #include "datasets/statistics_store.h"
 #include "support/example_campaign.h"
@@ -149,6 +150,25 @@ TEST_F(RawStore, FlagsAreKeptAndAFileFromBeforeThemIsStillRead) {
   EXPECT_EQ(ledger_of(file, id)->frames_stored, 100u);
   EXPECT_EQ(ledger_of(file, id)->frames_clipped, 0u);
   EXPECT_EQ(ledger_of(file, id)->source, "tcp:x");
+}
+
+/// `doctor` reads a run that grows meanwhile.
+TEST_F(RawStore, ASnapshotIsOfOneInstant) {
+  RawWriter writer(file, "R1", {}, 133);
+  writer.frames(frames(0, 300));
+  writer.commit(Ledger{.frames_emitted = 300, .frames_stored = 300});
+  const CampaignFile reader(folder / "c.db", Access::kRead);
+  {
+    const Snapshot snapshot(reader);
+    const RawRun run = raw_run(reader, "R1").value();
+    writer.frames(frames(300, 200));
+    writer.commit(Ledger{.frames_emitted = 500, .frames_stored = 500});
+    Notes notes;
+    read_raw(reader, run, notes);
+    EXPECT_EQ(notes.bytes.size(), 300u * 8);
+    EXPECT_EQ(ledger_of(reader, run.id)->frames_stored, 300u);
+  }
+  EXPECT_EQ(raw_run(reader, "R1")->frames, 500u);
 }
 
 TEST_F(RawStore, RunsAreNamedOnce) {
