@@ -294,6 +294,14 @@ std::string path_of(const Run& run, const RawRun& raw, RecordingsByPath& taken) 
   return path.string();
 }
 
+/// A folder knows whole recordings only: what reduce leaves out of the file it must leave out of the
+/// folder's.
+void exclude_if_not_whole(const RawRun& raw, Sheet& runs, std::size_t row) {
+  if (raw.state == RunState::kComplete) return;
+  std::string& excluded = runs.rows[row].cells[runs.ensure("excluded")];
+  if (excluded.empty()) excluded = "its recording is partial";
+}
+
 void write_folder(const CampaignFile& file, const fs::path& folder, const Progress& progress) {
   write_text(folder / "campaign.toml", file.info().toml);
   const Sheet no_points{.file = "", .columns = {"cell", "applied_force_N", "voltage_V"}, .rows = {}};
@@ -307,6 +315,7 @@ void write_folder(const CampaignFile& file, const fs::path& folder, const Progre
     if (const auto raw = raw_run(file, run.run)) {
       const std::string path = path_of(run, *raw, taken);
       sheet->rows[run.row].cells[sheet->require("raw")] = path;
+      exclude_if_not_whole(*raw, *sheet, run.row);
       export_raw_run(file, *raw, folder / path);
     }
     if (progress) progress(++done, runs.size());

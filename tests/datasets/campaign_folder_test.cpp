@@ -282,6 +282,35 @@ TEST_F(Folder, ExportKeepsTwoRecordingsOfOnePathApart) {
   EXPECT_EQ(again.runs()[2].raw, "raw/R1-2.npy");
 }
 
+/// An import calls every recording complete.
+TEST_F(Folder, APartialRecordingLeavesAsExcluded) {
+  campaign.write(source);
+  import_campaign_folder(source, db, options());
+  {
+    CampaignFile file(db, CampaignFile::Access::kRecord);
+    for (const std::string name : {"P1", "P2"}) {
+      file.append_row("runs", {{"run", name},
+                               {"location", "OT"},
+                               {"repeat", "9"},
+                               {"session", "S1"},
+                               {"start_utc", "2026-03-02T12:00:00Z"},
+                               {"raw", "raw/" + name + ".npy"},
+                               {"excluded", name == "P2" ? "a gust" : ""}});
+      RawWriter writer(file, name, {}, 133);
+      writer.frames(test::example_frames(100, 3));
+      writer.finish(RunState::kPartial, {});
+    }
+  }
+  export_campaign_folder(CampaignFile(db, CampaignFile::Access::kRead), folder / "out", {});
+  import_campaign_folder(folder / "out", folder / "again.db", options());
+  const auto runs = CampaignFile(folder / "again.db", CampaignFile::Access::kRead).runs();
+  std::map<std::string, std::string> excluded;
+  for (const tunnelrig::Run& run : runs)
+    if (!run.excluded.empty()) excluded[run.run] = run.excluded;
+  EXPECT_THAT(excluded, testing::UnorderedElementsAre(std::pair("P1", "its recording is partial"),
+                                                      std::pair("P2", "a gust")));
+}
+
 TEST(SharedExample, RoundTrip) {
   SKIP_WITHOUT_SHARED_DATA();
   const test::TemporaryFolder folder;
