@@ -34,7 +34,7 @@ constexpr std::array<Meaning, 26> kMeanings = {
       "no temperature of air; degrees Celsius, kelvin or Fahrenheit?"},
      {"air_pressure_Pa", "pressure", kLowest_Pa, kHighest_Pa,
       "no absolute pressure of air, which is from 20 to 120 kPa; Pa, hPa or kPa?"},
-     {"relative_humidity", "number", 0, 1, "no relative humidity, which is from 0 to 1, or from 0 to 100 %"},
+     {"relative_humidity", "number", 0, 1.05, "no relative humidity, which is from 0 to 1, or from 0 to 100 %"},
      {"supply_voltage_V", "voltage", 0, kNoLimit, "no supply voltage: it is not negative"},
      {"tunnel_airspeed_m_s", "velocity"},
      {"cell_temperature_C", "temperature", -80, 200,

@@ -14,7 +14,7 @@ constexpr double kGravity = 9.80665;   // m/s², standard
 constexpr double kPound = 0.45359237;  // kg
 constexpr double kPi = std::numbers::pi;
 
-constexpr std::array<Unit, 94> kUnits = {{
+constexpr std::array<Unit, 95> kUnits = {{
     {"1", "number", 1, 0},
     {"", "number", 1, 0},
     {kTextUnit, "text", 1, 0},
@@ -78,6 +78,7 @@ constexpr std::array<Unit, 94> kUnits = {{
     {"W", "power", 1, 0},
     {"mW", "power", 1e-3, 0},
     {"kW", "power", 1e3, 0},
+    {"MW", "power", 1e6, 0},
     {"s", "time", 1, 0},
     {"ms", "time", 1e-3, 0},
     {"us", "time", 1e-6, 0},

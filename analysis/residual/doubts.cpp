@@ -32,6 +32,11 @@ void warn_of_doubts(Explanation& explanation) {
           fmt::format("{}: its {} is {:.4g} to {:.4g}, and theory says {:.4g}: something else goes with it",
                       adopted.term.label(), amplitude.name, amplitude.low, amplitude.high, *theory));
   }
+  if (explanation.noise_floor > explanation.after.held_out_high)
+    explanation.warnings.emplace_back(
+        "the noise floor is above all of the error's interval: the rows scatter less evenly than its "
+        "variances "
+        "can follow, so that it is too high");
   const bool worse = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
   if (const SealedErrors& sealed = explanation.sealed;
       worse && sealed.all < std::min(sealed.curves, explanation.before.held_out_rmse))

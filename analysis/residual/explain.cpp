@@ -90,6 +90,7 @@ std::string refutation(const AdoptedEffect& adopted) {
   if (adopted.term.effect->theory_only || adopted.term.at_theory) return "";
   const ParameterEstimate& amplitude = adopted.parameters[0];
   if (adopted.at_bound) return fmt::format("its {} is at its physical bound", amplitude.name);
+  if (adopted.anywhere) return "when it happened is not known within half of the runs";
   if (adopted.bends_away)
     return fmt::format("what goes with {} bends away from its formula",
                        fmt::join(adopted.term.effect->covariates, ", "));
@@ -109,7 +110,7 @@ struct Refuted {
   std::vector<Term> terms;
   std::vector<std::string> why;  // of each of `terms`
   bool at_bound = false;         // one of them
-  bool bends_away = false;       // one of them
+  bool structure = false;        // of one of them the data have, in another shape
   bool all = false;
   bool any() const { return all || !terms.empty(); }
 };
@@ -124,7 +125,7 @@ Refuted refuted(const Explanation& explanation) {
     result.terms.push_back(adopted.term);
     result.why.push_back(why);
     result.at_bound |= adopted.at_bound;
-    result.bends_away |= adopted.bends_away;
+    result.structure |= adopted.bends_away || adopted.anywhere;
   }
   result.all = result.terms.empty() && refutable &&
                worse(explanation.sealed.all, explanation.sealed.curves) && explanation.sealed.against_names;
@@ -154,8 +155,8 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
     if (found.all) std::erase_if(fewer, [](const Effect* effect) { return !effect->theory_only; });
     Explanation without = explain_once(observations, fewer, stricter);
     without.untestable = explanation.untestable;
-    // What bends away from a formula is structure, and predicts as such.
-    const double without_them = found.bends_away ? without.sealed.all : without.sealed.names;
+    // What bends away from a formula, or is no step, is structure, and predicts as such.
+    const double without_them = found.structure ? without.sealed.all : without.sealed.names;
     const bool stay = !found.at_bound && worse(explanation.sealed.curves, explanation.sealed.all) &&
                       worse(without_them, explanation.sealed.all);
     if (found.all) said.push_back(taken_back_all(explanation));

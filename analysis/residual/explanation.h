@@ -51,6 +51,7 @@ struct AdoptedEffect {
   double held_out_gain = 0;  // unit of the response
   bool at_bound = false;     // of the amplitude, with the sealed runs in
   bool bends_away = false;   // likewise: what its covariate does is not its formula
+  bool anywhere = false;     // of a step: its run's interval is most of the course
   std::vector<std::string> confounded_with;
   std::optional<SeparatingRun> separating_run;
 };

@@ -319,6 +319,9 @@ void estimate_on_all(const Models& models, const Observations& observations,
     estimate.low = point.low;
     estimate.high = point.high;
     estimate.run = observations.name[static_cast<std::size_t>(estimate.value)];
+    constexpr double kMostOfTheCourse = 0.5;
+    explanation.adopted[point.term].anywhere |=
+        point.high - point.low > kMostOfTheCourse * static_cast<double>(rows.size());
   }
   warn_of_doubts(explanation);
   warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);

@@ -159,8 +159,8 @@ class Search {
   /// Whether an effect is beyond chance among all candidates with the curves in: what was found while their
   /// structure was in the residual may have been a part of it. `without`: the fit without it.
   bool is_still_found(const Term& term, const JointFit& without);
-  /// Whether the newest curve, over a covariate of this effect, has more of the effect's size than its
-  /// formula may leave: then the effect was only the curve's straight part.
+  /// Whether the newest curve, over a covariate of this effect or one that tells as much, has more of the
+  /// effect's size than its formula may leave: then the effect was only the curve's straight part.
   bool outshone_by_curve(const Term& term) const;
   Eigen::MatrixXd made_by_newest_curve() const;
   /// Whether a bend over its own covariate is there beside accepted effect t, and has that much of its size.
@@ -183,6 +183,7 @@ class Search {
   double share_beside(const Curve& curve, const Term& term, const Eigen::MatrixXd& made,
                       const Eigen::MatrixXd& predicted) const;
   /// Whether a curve does nearly all that an effect's conditions do, so that a name beside it means nothing.
+  static bool is_whole_curve_of(const Curve& curve, const Term& term);  // its rotor's, nothing taken out
   bool is_work_of_a_curve(const Term& term, const Eigen::MatrixXd& made,
                           const Eigen::MatrixXd& predicted) const;
   /// Of which rotor; −1: of what several do; nothing where it is not.

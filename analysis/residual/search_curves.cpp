@@ -17,6 +17,10 @@ namespace {
 /// it.
 constexpr double kMostLeft = 0.3, kMostLeft_bending = 1;
 
+/// A curve over another condition that leaves no more of an effect's variance than this can do all that the
+/// effect does.
+constexpr double kLittle_other = 0.02;
+
 }  // namespace
 
 void Search::add_curves(const CurveScan& first) {
@@ -172,23 +176,32 @@ double Search::share_beside(const Curve& curve, const Term& term, const Eigen::M
 
 bool Search::is_work_of_a_curve(const Term& term, const Eigen::MatrixXd& made,
                                 const Eigen::MatrixXd& predicted) const {
-  constexpr double kLittle = 0.1;  // of its variance
+  constexpr double kLittle = 0.1;  // of its variance, over a condition of its own
   const auto names = conditions_of(*term.effect);
   return !term.per_group &&
          std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
-           return found.curve.everywhere() && found.curve.tilt.empty() && found.curve.rotor == term.rotor &&
-                  found.curve.x.size() > 0 && is_over(found.curve, names) &&
-                  share_beside(found.curve, term, made, predicted) < kLittle;
+           return is_whole_curve_of(found.curve, term) &&
+                  share_beside(found.curve, term, made, predicted) <
+                      (is_over(found.curve, names) ? kLittle : kLittle_other);
          });
+}
+
+bool Search::is_whole_curve_of(const Curve& curve, const Term& term) {
+  return curve.everywhere() && !curve.strength && curve.tilt.empty() && curve.rotor == term.rotor &&
+         curve.x.size() > 0;
 }
 
 bool Search::outshone_by_curve(const Term& term) const {
   const Curve& curve = result_.curves.back().curve;
-  if (curve.tilt.empty() || !is_over(curve, conditions_of(*term.effect))) return false;
-  const Eigen::MatrixXd drawn = made_by_newest_curve();
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+  const Eigen::MatrixXd made = respond(term, observations_, predicted).value[0];
+  const bool over_its_own = !curve.tilt.empty() && is_over(curve, conditions_of(*term.effect));
+  // Over a condition that tells the effect's own, a curve may be large only because the two cancel.
+  const bool over_the_like =
+      is_whole_curve_of(curve, term) && share_beside(curve, term, made, predicted) < kLittle_other;
+  if (!over_its_own && !over_the_like) return false;
   const double most = term.effect->parameters.size() > 1 ? kMostLeft_bending : kMostLeft;
-  return rms_of(drawn) > most * rms_of(respond(term, observations_, predicted).value[0]);
+  return rms_of(made_by_newest_curve()) > most * rms_of(made);
 }
 
 Eigen::MatrixXd Search::made_by_newest_curve() const {

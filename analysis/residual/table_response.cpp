@@ -29,6 +29,7 @@ void set_response(const TableSource& source, const ObservationChoice& choice, Ob
   result.coefficient = result.coefficient || reduced;
   const std::string_view quantity = unit_from_name(column.unit).quantity;
   result.of_air = own && !reduced && (!column.meaning.empty() || quantity == "power" || quantity == "torque");
+  result.of_no_quantity = quantity == "number" && column.unit != "counts" && column.meaning.empty();
   for (Index r = 0; r < source.count(); ++r) {
     const Observation& row = source.row(r);
     result.value(r, 0) = source.converted(r, column);

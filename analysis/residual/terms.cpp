@@ -169,7 +169,13 @@ std::vector<double> change_points(const Observations& observations, const std::v
   if (static_cast<int>(blocks.size()) < 2 * kLeastBlocksBesideAStep) return {};
   std::vector<double> points{first.begin() + kLeastBlocksBesideAStep,
                              first.end() - kLeastBlocksBesideAStep + 1};
-  std::erase_if(points, [&](double point) { return !is_within_a_group(observations, rows, point); });
+  const double least = kLeastShareBesideAStep * static_cast<double>(rows.size());
+  std::erase_if(points, [&](double point) {
+    const auto before = static_cast<double>(
+        std::ranges::count_if(rows, [&](int row) { return row < static_cast<int>(point); }));
+    return before < least || static_cast<double>(rows.size()) - before < least ||
+           !is_within_a_group(observations, rows, point);
+  });
   constexpr std::size_t kMost = 300;
   const std::size_t every = std::max<std::size_t>(1, (points.size() + kMost - 1) / kMost);
   std::vector<double> some;
@@ -272,6 +278,12 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason =
         "only a table's thrust, coefficient, power or torque is held against a baseline without the density "
         "of its air";
+  const bool of_the_air = std::ranges::any_of(effect.covariates, [](const std::string& name) {
+    return name == "air_temperature_C" || name == "air_pressure_Pa" || name == "relative_humidity";
+  });
+  if (of_the_air && observations.of_no_quantity && !observations.is_line())
+    result.reason =
+        "the response is a number without a unit: nothing says that a cell read it, or that the air is in it";
   if (effect.name == "tip_mach" && observations.from_table) {
     if (observations.find(kDiameter) == nullptr) result.missing.emplace_back(kDiameter);
     if (const auto why = observations.not_usable.find(std::string(kDiameter));

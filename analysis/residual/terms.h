@@ -58,6 +58,7 @@ std::vector<Term> terms_of_theory(const Observations& observations);
 
 /// Blocks that a step leaves on either side.
 inline constexpr int kLeastBlocksBesideAStep = 3;
+inline constexpr double kLeastShareBesideAStep = 0.05;  // of the runs: the ends of a long course are no step
 
 /// All ways to try an effect: rotors, shapes on their grids, change-points with three blocks of `rows` on
 /// each side.
