@@ -83,6 +83,7 @@ TEST(TableSchema, ValuesThatTheirMeaningRulesOutAreRefused) {
   };
   for (const Case& c :
        {Case{"1", "relative_humidity", "55", "0.55", "55 is no relative humidity, which is from 0 to 1"},
+        Case{"%", "relative_humidity", "105.1", "104.9", "105.1 % is no relative humidity"},
         Case{"%", "relative_humidity", "120", "55", "120 % is no relative humidity"},
         Case{"Pa", "air_pressure_Pa", "1013", "101300", "1013 Pa is no absolute pressure of air"},
         Case{"hPa", "air_pressure_Pa", "101", "1013", "101 hPa is no absolute pressure of air"},

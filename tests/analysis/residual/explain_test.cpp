@@ -284,6 +284,22 @@ TEST_F(ExplainTest, AFormulaThatItsOwnCovariateBendsAwayFromIsNoName) {
   EXPECT_TRUE(named.unknown.empty());
 }
 
+/// The same where another column tells as much: beside a curve over that one, the name would have any size.
+TEST_F(ExplainTest, ANameAndACurveOverTheLikeThatCancelAreNoName) {
+  for (int number = 0; number < 6; ++number) {
+    Observations o = observations(16);
+    const Eigen::ArrayXd u = 2 * (o.find("supply_voltage_V")->value.array() - 16);
+    std::normal_distribution<double> normal(0, 0.02);
+    o.covariates.push_back(
+        {"throttle", (u + Eigen::ArrayXd::NullaryExpr(u.size(), [&] { return normal(random); })).matrix()});
+    test::set_y(
+        o, o.y + (0.004 * (u + 1.5 * o.find("throttle")->value.array().square())).matrix().replicate(1, 4));
+    const Explanation e = explained(o);
+    EXPECT_TRUE(e.adopted.empty()) << explanation_text(e);
+    EXPECT_EQ(e.unknown.size(), 1u);
+  }
+}
+
 TEST_F(ExplainTest, AnEffectOfOneRotorIsThatRotors) {
   Observations o = observations(16);
   test::add_covariate(o, "cable_force_N", -1, 1, random);

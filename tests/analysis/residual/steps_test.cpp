@@ -166,7 +166,10 @@ TEST_F(Steps, InALongTableAreFoundWhereTheyAre) {
   o.blocks_are_rows = o.from_table = true;
   o.covariates.push_back({"run_order", Eigen::VectorXd::LinSpaced(o.rows(), 0, 639), true});
   const auto all = o.all_rows();
-  EXPECT_LE(ways_to_try(test::effect_named("propeller_step"), o, all).size(), 300u);
+  const std::vector<Term> ways = ways_to_try(test::effect_named("propeller_step"), o, all);
+  EXPECT_LE(ways.size(), 300u);
+  EXPECT_GE(first_row_of(ways.front()), 32) << "the first rows of a long course are no step";
+  EXPECT_LE(first_row_of(ways.back()), 608);
   for (const Index first : {300, 301, 302}) {
     Observations stepped = o;
     step(stepped, first, 0, 0.02);

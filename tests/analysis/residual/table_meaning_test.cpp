@@ -36,6 +36,29 @@ TEST_F(TablesTest, FourSettingsAreFourBlocksHoweverManyBinsAreAskedFor) {
   EXPECT_EQ(e.verdict, "insufficient");
 }
 
+/// A power follows the air, a cell's counts its temperature; of a number without a unit neither is known.
+TEST_F(TablesTest, ANumberOfWhichNothingIsKnownFollowsNoAir) {
+  std::string csv = "T,p,h,y\n";
+  for (int r = 0; r < 60; ++r)
+    csv += fmt::format("{},{},{},{}\n", 15 + 10 * even(random), 990 + 30 * even(random),
+                       100.05 * even(random), 450 + scatter(random));
+  const auto reason = [&](const char* unit, const char* effect) {
+    const Observations o = observed(csv, fmt::format("[response]\ncolumn = \"y\"\nunit = \"{}\"\n"
+                                                     "[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\n"
+                                                     "meaning = \"air_temperature_C\"\n"
+                                                     "[[covariates]]\ncolumn = \"p\"\nunit = \"hPa\"\n"
+                                                     "meaning = \"air_pressure_Pa\"\n"
+                                                     "[[covariates]]\ncolumn = \"h\"\nunit = \"%\"\n"
+                                                     "meaning = \"relative_humidity\"\n",
+                                                     unit));
+    return testability(test::effect_named(effect), o).reason;
+  };
+  for (const char* effect : {"air_pressure", "air_humidity", "air_temperature"}) {
+    EXPECT_EQ(reason("MW", effect), "") << effect;
+    EXPECT_THAT(reason("1", effect), HasSubstr("a number without a unit")) << effect;
+  }
+}
+
 /// Two propellers that the model never saw: every other row gives their constants, the rest are scored.
 TEST_F(TablesTest, WholeGroupsCanBeHeldOut) {
   std::string csv = "propeller,V,y\n";
