@@ -33,6 +33,23 @@ std::optional<Sheet> read_if_given(const std::string& path) {
   return read_csv(path);
 }
 
+/// The certificate; a refusal names the files that were given where these are not the campaign's own sheets.
+Certificate calibrate_as_named(const std::vector<CalibrationPoint>& points,
+                               const std::vector<PropellerTest>& tests, const CalibrationOptions& how,
+                               const CalibrateOptions& options) {
+  try {
+    return calibrate(points, tests, how);
+  } catch (const InputError& error) {
+    const std::string_view message = error.what();
+    for (const auto& [sheet, given] :
+         {std::pair<std::string_view, std::string>{"calibration.csv", options.points},
+          {"propellers.csv", options.propellers}})
+      if (!given.empty() && message.starts_with(sheet))
+        throw InputError(given + std::string(message.substr(sheet.size())));
+    throw;
+  }
+}
+
 int calibrate_campaign(const CalibrateOptions& options) {
   CampaignFile file(options.db, CampaignFile::Access::kWrite);
   const CampaignInfo info = file.info();
@@ -46,7 +63,7 @@ int calibrate_campaign(const CalibrateOptions& options) {
   const auto tests = new_tests ? parse_propellers(*new_tests, info.rig.rotors) : file.propeller_tests();
   if (points.empty())
     throw InputError::in(options.db, "holds no calibration points; --points calibration.csv adds them");
-  Certificate certificate = calibrate(points, tests, how);
+  Certificate certificate = calibrate_as_named(points, tests, how, options);
   for (std::string& doubt : calibration_doubts(file, points))
     certificate.warnings.push_back(std::move(doubt));
   const nlohmann::json inputs{{"points", certificate.points_hash}};

@@ -122,8 +122,8 @@ int run_explain(ExplainOptions options) {
                                               {options.db, program_version(), arguments(), now_utc()}));
   if (options.adopt_empirical && !adoptable(observations))
     warn(
-        "a model corrects the thrusts of a campaign: the curve is in the errors above, and nothing is "
-        "stored");
+        "the curves are in the errors above; no model is stored, since one corrects the thrusts of a "
+        "campaign");
   else if (options.adopt || options.adopt_empirical)
     adopt_and_store(options, without_set_aside(observations, explanation), explanation);
   return kWell;

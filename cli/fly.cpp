@@ -39,6 +39,9 @@ NamedMap map_of(const FlyOptions& options) {
 }
 
 std::vector<std::string> controllers_of(const FlyOptions& options) {
+  for (auto name = options.controllers.begin(); name != options.controllers.end(); ++name)
+    if (std::find(options.controllers.begin(), name, *name) != name)
+      throw InputError(fmt::format("--controllers: {} is named twice", *name));
   if (!options.controllers.empty()) return options.controllers;
   std::vector<std::string> names;
   for (const ControllerKind& kind : controller_kinds()) names.emplace_back(kind.name);

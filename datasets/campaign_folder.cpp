@@ -96,8 +96,11 @@ std::vector<Gap> read_gaps(const fs::path& path, std::uint64_t frames) {
       throw InputError(fmt::format("{}: {:g} is no whole number of frames, 1 or more",
                                    sheet.where(row, "frames_lost"), lost));
     }
+    const std::string& estimated = sheet.text(row, "estimated");
+    if (!estimated.empty() && estimated != "0" && estimated != "1")
+      throw InputError(fmt::format("{}: '{}' is neither 0 nor 1", sheet.where(row, "estimated"), estimated));
     gaps.push_back({static_cast<std::uint64_t>(first), static_cast<std::uint64_t>(lost),
-                    sheet.text(row, "cause"), sheet.text(row, "estimated") == "1"});
+                    sheet.text(row, "cause"), estimated == "1"});
   }
   return gaps;
 }

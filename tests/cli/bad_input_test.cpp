@@ -175,7 +175,10 @@ TEST_F(BadInput, CalibrationThatSaysNothing) {
       "8\n";
   campaign.write(folder / "source");
   ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
-  EXPECT_THAT(refusal_of("calibrate --db c.db", {"source", "c.db"}), HasSubstr("cell 1"));
+  EXPECT_THAT(refusal_of("calibrate --db c.db", {"source", "c.db"}), HasSubstr("calibration.csv: cell 1"));
+  write_text(folder / "mine.csv", campaign.calibration_csv);
+  EXPECT_THAT(refusal_of("calibrate --db c.db --points mine.csv", {"source", "c.db", "mine.csv"}),
+              HasSubstr("mine.csv: cell 1"));
 }
 
 /// A row that no verb could read again would lock the whole file.

@@ -192,6 +192,7 @@ TEST_F(Fly, AResultWithoutAPlaceIsRefusedBeforeItIsFlown) {
 
 TEST_F(Fly, OtherBadOptionsAreRefused) {
   EXPECT_THAT(refusal("--controllers lqr"), HasSubstr("no controller is called 'lqr'; there are ibs,"));
+  EXPECT_THAT(refusal("--controllers ibs,indi,ibs"), HasSubstr("ibs is named twice"));
   for (const char* name : {"lqr", "pid-stock"})
     EXPECT_THAT(refusal(std::string("--tune tuned.toml --controllers ") + name), HasSubstr(name));
   EXPECT_FALSE(std::filesystem::exists(folder / "tuned.toml"));

@@ -231,6 +231,9 @@ TEST_F(Folder, RefusesBadRawData) {
   write_text(source / "raw/R2.gaps.csv", "first_frame,frames_lost\n51,3\n");
   EXPECT_THAT(import_refusal(),
               HasSubstr("R2.gaps.csv:2: column first_frame: 51 is no frame index from 0 to 50"));
+  write_text(source / "raw/R2.gaps.csv", "first_frame,frames_lost,estimated\n50,3,true\n");
+  EXPECT_THAT(message_of([&] { import_campaign_folder(source, db, options()); }),
+              HasSubstr("R2.gaps.csv:2: column estimated: 'true' is neither 0 nor 1"));
 }
 
 TEST_F(Folder, TakesAStuckChannelWhenAsked) {

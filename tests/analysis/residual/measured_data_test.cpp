@@ -159,7 +159,7 @@ TEST_F(UiucStatic, ACurveWithoutANameIsScoredBesideTheName) {
     of(propeller, "rank(N) > 0.7");
     const auto result = test::run_program(folder.path(), "explain --db t.db --adopt-empirical --json e.json");
     EXPECT_EQ(result.code, 0) << result.error;
-    EXPECT_THAT(result.error, HasSubstr("nothing is stored"));
+    EXPECT_THAT(result.error, HasSubstr("no model is stored"));
     const json e = json::parse(read_text(folder / "e.json"));
     EXPECT_EQ(e["empirical"].size(), e["unknown"].size()) << propeller;
   }
