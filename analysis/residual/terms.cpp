@@ -5,11 +5,13 @@
 #include "analysis/residual/upper_median.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <optional>
 #include <set>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -171,8 +173,7 @@ std::vector<double> change_points(const Observations& observations, const std::v
                              first.end() - kLeastBlocksBesideAStep + 1};
   const double least = kLeastShareBesideAStep * static_cast<double>(rows.size());
   std::erase_if(points, [&](double point) {
-    const auto before = static_cast<double>(
-        std::ranges::count_if(rows, [&](int row) { return row < static_cast<int>(point); }));
+    const auto before = static_cast<double>(std::ranges::lower_bound(rows, point) - rows.begin());
     return before < least || static_cast<double>(rows.size()) - before < least ||
            !is_within_a_group(observations, rows, point);
   });
@@ -195,6 +196,14 @@ bool forces_differ(const Observations& observations) {
   const MatrixXd force = observations.multiplicative ? MatrixXd(predicted.array().log()) : predicted;
   const double variance = (force.rowwise() - force.colwise().mean()).squaredNorm();
   return variance > least * variance_of_constants(observations, predicted).sum();
+}
+
+/// What the air's state does to a force, or to a cell whose own temperature is not known.
+bool is_of_air_or_of_a_cell_in_it(const Effect& effect) {
+  constexpr std::array<std::string_view, 4> kOfAir = {"air_humidity", "air_pressure", "air_temperature",
+                                                      "temperature_gradient"};
+  const bool drift = effect.name == "span_drift_temperature" || effect.name == "zero_drift_temperature";
+  return std::ranges::count(kOfAir, effect.name) > 0 || (drift && effect.form == "air");
 }
 
 /// Whether the response is a thrust that its measured speed, and the density of its air, make C_T; another
@@ -278,10 +287,7 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason =
         "only a table's thrust, coefficient, power or torque is held against a baseline without the density "
         "of its air";
-  const bool of_the_air = std::ranges::any_of(effect.covariates, [](const std::string& name) {
-    return name == "air_temperature_C" || name == "air_pressure_Pa" || name == "relative_humidity";
-  });
-  if (of_the_air && observations.of_no_quantity && !observations.is_line())
+  if (observations.of_no_quantity && !observations.is_line() && is_of_air_or_of_a_cell_in_it(effect))
     result.reason =
         "the response is a number without a unit: nothing says that a cell read it, or that the air is in it";
   if (effect.name == "tip_mach" && observations.from_table) {
