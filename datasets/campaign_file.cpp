@@ -146,6 +146,8 @@ void migrate(Database& database, std::string_view schema) {
 
 CampaignFile::CampaignFile(const std::filesystem::path& path, Access access) : path_(path) {
   std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    throw InputError::in(path.string(), "is a folder, where a campaign file is asked for");
   if (access != Access::kRecord && !std::filesystem::is_regular_file(path, error)) {
     throw InputError::in(path.string(), "{}", absence(error, "there is no such campaign file"));
   }

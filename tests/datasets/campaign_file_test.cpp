@@ -89,6 +89,9 @@ TEST(CampaignFile, RefusesWhatIsNoCampaign) {
               HasSubstr("is no campaign file"));
   EXPECT_THAT(message_of([&] { CampaignFile(folder / "none.db", Access::kRead); }),
               HasSubstr("there is no such campaign file"));
+  for (const auto access :
+       {CampaignFile::Access::kRead, CampaignFile::Access::kWrite, CampaignFile::Access::kRecord})
+    EXPECT_THAT(message_of([&] { CampaignFile(folder.path(), access); }), HasSubstr("is a folder"));
   Database((folder / "other.db").string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE)
       .execute("CREATE TABLE t (x)");
   EXPECT_THAT(message_of([&] { CampaignFile(folder / "other.db", Access::kWrite); }),
