@@ -288,7 +288,12 @@ std::vector<std::string> close_interrupted_runs(CampaignFile& file) {
   for (const RawRun& run : raw_runs(file)) {
     if (run.state != RunState::kRecording) continue;
     HashSink sink(run.format);
-    read_raw(file, run, sink);
+    try {
+      read_raw(file, run, sink);
+    } catch (const StorageError&) {
+      // What can be read of it has its hash. Who reads the run is told of the damage; the next one must not
+      // wait for it.
+    }
     Statement(file.database(), "UPDATE ledgers SET end_reason = ? WHERE raw_run = ?")
         .bind(kInterrupted)
         .bind(run.id)

@@ -133,6 +133,21 @@ TEST_F(RawStore, InterruptedRunsBecomePartial) {
   EXPECT_TRUE(close_interrupted_runs(file).empty());
 }
 
+/// The file can be recorded to all the same.
+TEST_F(RawStore, AnInterruptedRunThatIsDamagedBecomesPartialAndStaysDamaged) {
+  {
+    RawWriter writer(file, "R1", {}, 100);
+    writer.frames(frames(0, 500));
+    writer.commit(Ledger{.frames_emitted = 500, .frames_stored = 500});
+  }
+  file.database().execute("UPDATE raw_chunks SET data = zeroblob(800) WHERE (id & 4294967295) = 300");
+  EXPECT_THAT(close_interrupted_runs(file), testing::ElementsAre("R1"));
+  const RawRun run = raw_run(file, "R1").value();
+  EXPECT_EQ(run.state, RunState::kPartial);
+  Notes notes;
+  EXPECT_THROW(read_raw(file, run, notes), StorageError);
+}
+
 TEST_F(RawStore, FlagsAreKeptAndAFileFromBeforeThemIsStillRead) {
   RawWriter writer(file, "R1", {}, 133);
   writer.frames(frames(0, 100));
