@@ -10,7 +10,6 @@ namespace tunnelrig::attribution {
 namespace {
 
 constexpr double kFirstDay_s = 1772409600;  // Monday 2026-03-02, 00:00 UTC
-constexpr double kDay_s = 86400;
 
 struct Visit {
   std::string location;

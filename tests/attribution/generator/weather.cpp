@@ -3,11 +3,6 @@
 #include <numbers>
 
 namespace tunnelrig::attribution {
-namespace {
-
-constexpr double kDay_s = 86400;
-
-}  // namespace
 
 Course::Course(Random& random, double shortest_s, double longest_s) {
   constexpr int kWaves = 8;

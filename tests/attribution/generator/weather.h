@@ -5,6 +5,8 @@
 
 namespace tunnelrig::attribution {
 
+inline constexpr double kDay_s = 86400;
+
 /// A smooth random course: waves of periods between two bounds, of variance 1 in all.
 class Course {
  public:
