@@ -148,7 +148,7 @@ ReadResult VirtualBoard::read(std::span<std::byte> buffer, std::chrono::millisec
     }
   }
   const std::size_t size = std::min(buffer.size(), arrived_.size() - read_);
-  std::memcpy(buffer.data(), arrived_.data() + read_, size);
+  if (size > 0) std::memcpy(buffer.data(), arrived_.data() + read_, size);  // nothing has no address
   read_ += size;
   if (read_ == arrived_.size()) {
     arrived_.clear();

@@ -220,8 +220,8 @@ TEST(RunSummary, ThreeBladesPassThreeTimesATurn) {
            0.04 * wave(3 * kShaft_hz, i);
   }));
   std::map<std::string, double> lines_V;
-  for (const SpectralLine& line : summarizer->finish("hash").channels[0].lines)
-    lines_V[line.name] = line.amplitude_V;
+  const RunStatistics statistics = summarizer->finish("hash");
+  for (const SpectralLine& line : statistics.channels[0].lines) lines_V[line.name] = line.amplitude_V;
   EXPECT_NEAR(lines_V["blade_pass"], 0.04, 0.002);
   EXPECT_NEAR(lines_V["shaft_x2"], 0.02, 0.002);
 }
