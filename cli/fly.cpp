@@ -39,9 +39,6 @@ NamedMap map_of(const FlyOptions& options) {
 }
 
 std::vector<std::string> controllers_of(const FlyOptions& options) {
-  for (auto name = options.controllers.begin(); name != options.controllers.end(); ++name)
-    if (std::find(options.controllers.begin(), name, *name) != name)
-      throw InputError(fmt::format("--controllers: {} is named twice", *name));
   if (!options.controllers.empty()) return options.controllers;
   std::vector<std::string> names;
   for (const ControllerKind& kind : controller_kinds()) names.emplace_back(kind.name);
@@ -73,7 +70,12 @@ void check_place(const std::string& path) {
 
 /// Everything that can be refused, before anything is flown or printed.
 void check_all(const FlyOptions& options, const std::vector<PlaceAndPath>& wanted, const GainTable& gains) {
-  for (const std::string& name : controllers_of(options)) AnyController(name, gains, {});
+  const std::vector<std::string> names = controllers_of(options);
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    if (std::find(names.begin(), name, *name) != name)
+      throw InputError(fmt::format("--controllers: {} is named twice", *name));
+    AnyController(*name, gains, {});
+  }
   const Airframe frame;
   for (const PlaceAndPath& one : wanted) {
     const FlightSpace space(tunnel_from(one.tunnel), frame);

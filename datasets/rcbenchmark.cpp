@@ -1,9 +1,9 @@
 #include "datasets/rcbenchmark.h"
 
 #include "datasets/error.h"
+#include "datasets/lower_case.h"
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 
 namespace tunnelrig {
@@ -12,12 +12,7 @@ namespace {
 constexpr std::string_view kMessage = "App message";  // in the program's own words, commas and all
 
 /// In capitals as well: a sweep that is passed over would not be missed.
-bool is_csv(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".csv";
-}
+bool is_csv(const std::filesystem::path& path) { return lower_case(path.extension().string()) == ".csv"; }
 
 std::vector<std::filesystem::path> sweep_files(const std::filesystem::path& source) {
   std::vector<std::filesystem::path> files;

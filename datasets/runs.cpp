@@ -1,11 +1,11 @@
 #include "datasets/campaign.h"
 #include "datasets/error.h"
 #include "datasets/locations.h"
+#include "datasets/lower_case.h"
 #include "datasets/run_columns.h"
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -82,13 +82,6 @@ void check_units(const Sheet& sheet) {
                            twin.theirs, twin.ours);
     }
   }
-}
-
-std::string lower_case(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return lower;
 }
 
 /// How spreadsheets and programs write that there is no number.

@@ -1,9 +1,9 @@
 // What was set up and recorded.
 #include "analysis/exports/table_builder.h"
 #include "analysis/exports/tables.h"
+#include "datasets/lower_case.h"
 
 #include <algorithm>
-#include <cctype>
 #include <set>
 #include <utility>
 
@@ -12,17 +12,12 @@ namespace {
 
 constexpr std::size_t kLongestKey = 55;  // MATLAB's 63 less what its variables begin with
 
-std::string in_small_letters(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 /// Makes names different even where capitals are not told apart, by a number behind them.
 class NamesTaken {
  public:
   std::string take(const std::string& wanted, std::size_t longest = 63) {
     std::string name = wanted;
-    for (int n = 2; !taken_.insert(in_small_letters(name)).second; ++n) {
+    for (int n = 2; !taken_.insert(lower_case(name)).second; ++n) {
       const std::string number = fmt::format("_{}", n);
       name = wanted.substr(0, std::min(wanted.size(), longest - number.size())) + number;
     }

@@ -60,13 +60,6 @@ struct ShapePoint {
   double x = 0, y = 0, low = 0, high = 0;  // y in the response's unit
 };
 
-/// An effect that would do as well as a curve: neither adopted nor scored.
-struct CouldBe {
-  std::string effect;
-  int rotor = -1;
-  bool at_theory = false;  // with the coefficient that theory gives
-};
-
 struct UnknownStructure {
   std::string covariate;       // as runs.csv has it, or session, run_order, time_in_run
   std::string condition;       // the same as the observations have it: hours_in_session, hour_of_day
@@ -81,7 +74,7 @@ struct UnknownStructure {
   std::vector<std::string> labels;      // of a column of texts: x = i + 1 stands for labels[i]
   std::vector<std::string> instead_of;  // effects over this covariate that do not follow it
   bool by_sealed_too = false;           // the open blocks alone do not show it
-  std::vector<CouldBe> could_be;        // names for that, which it is too late to score
+  std::vector<Term> could_be;           // names for that, which it is too late to score
 };
 
 struct Untestable {

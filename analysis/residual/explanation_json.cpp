@@ -53,9 +53,9 @@ Json unknown_json(const UnknownStructure& unknown) {
   for (const ShapePoint& point : unknown.shape)
     shape.push_back({finite(point.x), finite(point.y), finite(point.low), finite(point.high)});
   Json could_be = Json::array();
-  for (const CouldBe& name : unknown.could_be)
+  for (const Term& term : unknown.could_be)
     could_be.push_back(
-        {{"effect", name.effect}, {"rotor", rotor_json(name.rotor)}, {"at_theory", name.at_theory}});
+        {{"effect", term.effect->name}, {"rotor", rotor_json(term.rotor)}, {"at_theory", term.at_theory}});
   return {{"covariate", unknown.covariate},
           {"covariate_unit", unknown.covariate_unit},
           {"place", unknown.place.empty() ? Json(nullptr) : Json(unknown.place)},

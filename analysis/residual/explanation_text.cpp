@@ -89,9 +89,9 @@ std::string in_words(const AdoptedEffect& a) {
 
 std::string could_be_in_words(const UnknownStructure& u) {
   std::vector<std::string> names;
-  for (const CouldBe& name : u.could_be)
-    names.push_back(name.effect + (name.rotor < 0 ? "" : fmt::format(" of rotor {}", name.rotor + 1)) +
-                    (name.at_theory ? " at theory's coefficient" : ""));
+  for (const Term& term : u.could_be)
+    names.push_back(term.effect->name + (term.rotor < 0 ? "" : fmt::format(" of rotor {}", term.rotor + 1)) +
+                    (term.at_theory ? " at theory's coefficient" : ""));
   return fmt::format("{} would do as well, and could not be scored any more: more sessions would tell",
                      fmt::join(names, ", or "));
 }

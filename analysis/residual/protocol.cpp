@@ -289,8 +289,7 @@ void report_structure_left(const StructureLeft& left, const Observations& observ
   for (const FoundCurve& curve : left.curves) {
     explanation.unknown.push_back(describe(observations, left.fit, curve, rows));
     explanation.unknown.back().by_sealed_too = true;
-    for (const Term& term : curve.could_be)
-      explanation.unknown.back().could_be.push_back({term.effect->name, term.rotor, term.at_theory});
+    explanation.unknown.back().could_be = curve.could_be;
     explanation.by_sealed_too.push_back(curve.curve);
   }
   for (Round round : left.rounds) {

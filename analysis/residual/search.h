@@ -182,8 +182,9 @@ class Search {
   /// share that does not go with what the curve is over.
   double share_beside(const Curve& curve, const Term& term, const Eigen::MatrixXd& made,
                       const Eigen::MatrixXd& predicted) const;
+  /// Whether a curve is of an effect's rotors, the same everywhere, and nothing was taken out of it.
+  static bool is_whole_curve_of(const Curve& curve, const Term& term);
   /// Whether a curve does nearly all that an effect's conditions do, so that a name beside it means nothing.
-  static bool is_whole_curve_of(const Curve& curve, const Term& term);  // its rotor's, nothing taken out
   bool is_work_of_a_curve(const Term& term, const Eigen::MatrixXd& made,
                           const Eigen::MatrixXd& predicted) const;
   /// Of which rotor; −1: of what several do; nothing where it is not.

@@ -193,13 +193,12 @@ bool Search::is_whole_curve_of(const Curve& curve, const Term& term) {
 
 bool Search::outshone_by_curve(const Term& term) const {
   const Curve& curve = result_.curves.back().curve;
+  const bool over_its_own = !curve.tilt.empty() && is_over(curve, conditions_of(*term.effect));
+  if (!over_its_own && !is_whole_curve_of(curve, term)) return false;
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
   const Eigen::MatrixXd made = respond(term, observations_, predicted).value[0];
-  const bool over_its_own = !curve.tilt.empty() && is_over(curve, conditions_of(*term.effect));
   // Over a condition that tells the effect's own, a curve may be large only because the two cancel.
-  const bool over_the_like =
-      is_whole_curve_of(curve, term) && share_beside(curve, term, made, predicted) < kLittle_other;
-  if (!over_its_own && !over_the_like) return false;
+  if (!over_its_own && share_beside(curve, term, made, predicted) >= kLittle_other) return false;
   const double most = term.effect->parameters.size() > 1 ? kMostLeft_bending : kMostLeft;
   return rms_of(made_by_newest_curve()) > most * rms_of(made);
 }

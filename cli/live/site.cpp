@@ -1,10 +1,10 @@
 #include "cli/live/site.h"
 
 #include "datasets/error.h"
+#include "datasets/lower_case.h"
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 
 #include <arpa/inet.h>
 #include <nlohmann/json.hpp>
@@ -53,13 +53,6 @@ std::string_view query_token(std::string_view target) {
   return "";
 }
 
-std::string lower(std::string_view text) {
-  std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
-}
-
 /// "host:port" or "[::1]:port" cut at the port.
 std::pair<std::string_view, std::string_view> cut_port(std::string_view host) {
   const auto bracket = host.rfind(']');
@@ -102,10 +95,10 @@ bool is_loopback(std::string_view address) {
 bool Site::host_is_ours(std::string_view host) const {
   const auto [name, port] = cut_port(host);
   if (port != std::to_string(settings_.port) && !(port.empty() && settings_.port == 80)) return false;
-  const std::string lowered = lower(name);
+  const std::string lowered = lower_case(name);
   if (is_loopback(lowered)) return true;
   if (!settings_.open) return false;
-  const std::string own = lower(settings_.host_name);
+  const std::string own = lower_case(settings_.host_name);
   return is_address(lowered) || (!own.empty() && (lowered == own || lowered == own + ".local"));
 }
 
@@ -150,13 +143,13 @@ SiteAnswer Site::answer_head(const SiteRequest& request) const {
     return refusal(404, "there is nothing here");
   }
   if (path == "/") return {};
-  if (!request.origin.empty() && lower(request.origin) != lower("http://" + request.host))
+  if (!request.origin.empty() && lower_case(request.origin) != lower_case("http://" + request.host))
     return refusal(403, "this comes from another site");
   if (!request.fetch_site.empty() && request.fetch_site != "same-origin" && request.fetch_site != "none")
     return refusal(403, "this comes from another site");
   if (!posted) return {};
   if (!request.transfer_encoding.empty()) return refusal(411, "the length of a command must be known");
-  const std::string type = lower(request.content_type.substr(0, request.content_type.find(';')));
+  const std::string type = lower_case(request.content_type.substr(0, request.content_type.find(';')));
   if (type != "application/json" || !request.content_encoding.empty())
     return refusal(415, "a command is application/json, not compressed");
   return {};
