@@ -1,7 +1,7 @@
 #include "calibration/cell_checks.h"
 
+#include "calibration/known_truth.h"
 #include "calibration/load_cell.h"
-#include "calibration/points.h"
 
 #include <cmath>
 #include <iostream>
@@ -11,39 +11,10 @@
 namespace tunnelrig {
 namespace {
 
-struct Reading {
-  double force_N;
-  const char* direction = "";
-};
-
-/// Points in sequence on 0.3 + 0.2 · force plus `extra`, with noise.
-template <typename Extra>
-std::vector<CalibrationPoint> take(const std::vector<Reading>& readings, double noise_V, unsigned seed,
-                                   Extra extra) {
-  std::mt19937 engine(seed);
-  std::normal_distribution<double> normal(0, 1);
-  std::vector<CalibrationPoint> points;
-  for (const Reading& reading : readings) {
-    const int index = static_cast<int>(points.size());
-    points.push_back({.applied_force_N = reading.force_N,
-                      .voltage_V = 0.3 + 0.2 * reading.force_N + extra(reading) + noise_V * normal(engine),
-                      .sequence = index + 1,
-                      .direction = reading.direction,
-                      .line = index + 2});
-  }
-  return points;
-}
-
-std::vector<Reading> cycle() {
-  std::vector<Reading> readings;
-  for (int round = 0; round < 2; ++round) {
-    for (const double force : {0.0, 2.0, 4.0, 6.0, 8.0, 10.0}) readings.push_back({force, "up"});
-    for (const double force : {10.0, 8.0, 6.0, 4.0, 2.0, 0.0}) readings.push_back({force, "down"});
-  }
-  return readings;
-}
-
-double nothing(const Reading&) { return 0; }
+using test::cycle;
+using test::nothing;
+using test::Reading;
+using test::take;
 
 CellChecks checks_of(const std::vector<CalibrationPoint>& points) { return fit_load_cell(points).checks; }
 
@@ -120,34 +91,6 @@ TEST(CellChecks, RepeatabilityIsTheScatterWithinOneForceAndDirection) {
   ASSERT_TRUE(checks.lack_of_fit);
   EXPECT_EQ(checks.lack_of_fit->dof_lack, 1);
   EXPECT_EQ(checks.lack_of_fit->dof_pure, 3);
-}
-
-/// Every test rejects a sound cell about as often as it says, and finds an effect of a few times the noise.
-TEST(CellChecks, TestsHaveTheirLevelAndSomePower) {
-  const unsigned seed = 4100;
-  std::cout << "seeds " << seed << " and following\n";
-  constexpr int kTrials = 500;
-  int lack = 0, quadratic = 0, hysteresis = 0, lack_found = 0, quadratic_found = 0, hysteresis_found = 0;
-  const LoadCellOptions keep_all{.leave_out_gross = false};
-  const auto bent = [](const Reading& r) { return 0.00006 * r.force_N * (r.force_N - 10); };
-  const auto kinked = [](const Reading& r) { return r.force_N > 5 ? 0.002 * std::cos(r.force_N * 1.6) : 0; };
-  const auto lagging = [](const Reading& r) { return std::string(r.direction) == "down" ? 0.0015 : 0; };
-  for (unsigned trial = 0; trial < kTrials; ++trial) {
-    const auto sound = fit_load_cell(take(cycle(), 0.001, seed + trial, nothing), keep_all).checks;
-    lack += sound.lack_of_fit->p < 0.05 ? 1 : 0;
-    quadratic += sound.linearity->p < 0.05 ? 1 : 0;
-    hysteresis += sound.hysteresis->p < 0.05 ? 1 : 0;
-    const auto checks = [&](auto extra) {
-      return fit_load_cell(take(cycle(), 0.001, seed + trial, extra), keep_all).checks;
-    };
-    lack_found += checks(kinked).lack_of_fit->p < 0.05 ? 1 : 0;
-    quadratic_found += checks(bent).linearity->p < 0.05 ? 1 : 0;
-    hysteresis_found += checks(lagging).hysteresis->p < 0.05 ? 1 : 0;
-  }
-  for (const int rejected : {lack, quadratic, hysteresis}) {
-    EXPECT_NEAR(rejected, 0.05 * kTrials, 4 * std::sqrt(0.05 * 0.95 * kTrials));
-  }
-  for (const int found : {lack_found, quadratic_found, hysteresis_found}) EXPECT_GT(found, 0.7 * kTrials);
 }
 
 }  // namespace

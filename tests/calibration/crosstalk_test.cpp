@@ -1,7 +1,6 @@
 #include "calibration/crosstalk.h"
 
-#include "calibration/distributions.h"
-#include "calibration/points.h"
+#include "calibration/known_truth.h"
 #include "support/temporary_folder.h"
 
 #include <cmath>
@@ -15,61 +14,15 @@
 namespace tunnelrig {
 namespace {
 
+using test::both_ways;
 using test::message_of;
+using test::SyntheticTable;
+using test::three_axes;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
 constexpr double kGramForce_N = 9.80665e-3;
-
-/// A table whose readings follow a known matrix: blocks of one axis each, a zero row first.
-struct SyntheticTable {
-  Eigen::MatrixXd matrix, even;
-  std::vector<std::vector<double>> loads;  // N, per axis
-  double noise = 0;
-
-  CrosstalkTable take(std::mt19937& engine) const {
-    std::normal_distribution<double> normal(0, 1);
-    const Eigen::Index n = matrix.rows();
-    Eigen::Index rows = n;
-    for (const auto& of_axis : loads) rows += static_cast<Eigen::Index>(of_axis.size());
-    CrosstalkTable table{
-        .file = "table.csv", .force_N = Eigen::MatrixXd::Zero(rows, n), .reading = Eigen::MatrixXd(rows, n)};
-    Eigen::Index row = 0;
-    for (Eigen::Index axis = 0; axis < n; ++axis) {
-      table.axes.push_back(fmt::format("force_{}", axis));
-      table.channels.push_back(fmt::format("reading_{}", axis));
-      const Eigen::VectorXd zero = zero_of(axis);
-      for (std::size_t load = 0; load <= loads[static_cast<std::size_t>(axis)].size(); ++load, ++row) {
-        if (load > 0) table.force_N(row, axis) = loads[static_cast<std::size_t>(axis)][load - 1];
-        const Eigen::VectorXd force = table.force_N.row(row).transpose();
-        table.reading.row(row) = (zero + matrix * force + even * force.cwiseAbs()).transpose();
-        for (Eigen::Index channel = 0; channel < n; ++channel)
-          table.reading(row, channel) += noise * normal(engine);
-        table.block.push_back(static_cast<int>(axis));
-        table.line.push_back(static_cast<int>(row) + 2);
-      }
-    }
-    return table;
-  }
-
-  Eigen::VectorXd zero_of(Eigen::Index block) const {
-    return Eigen::VectorXd::LinSpaced(matrix.rows(), 1, 2) * static_cast<double>(block + 1);
-  }
-};
-
-SyntheticTable three_axes() {
-  Eigen::Matrix3d matrix;
-  matrix << 2, 0.1, -0.05, 0.08, -3, 0.2, 0.02, 0.3, 2.5;
-  return {matrix, Eigen::Matrix3d::Zero(), {{2, 5, 7, 9}, {2, 5, 7, 9}, {-2, -5, -7, -9}}};
-}
-
-SyntheticTable both_ways() {
-  SyntheticTable table = three_axes();
-  table.even << 0.04, 0, 0, 0.01, -0.02, 0, 0, 0.03, 0;  // axis 2 is loaded one way
-  table.loads = {{2, 5, 9, -3, -9}, {2, 5, 9, -3, -9}, {2, 5, 9}};
-  return table;
-}
 
 TEST(Crosstalk, AKnownMatrixComesBackAndSoDoTheForces) {
   for (const SyntheticTable& truth : {three_axes(), both_ways()}) {
@@ -126,28 +79,6 @@ TEST(Crosstalk, AGrossRowIsNamedLeftOutAndKeptOnRequest) {
     EXPECT_TRUE(kept.suspicious[0].gross);
     EXPECT_FALSE(kept.suspicious[0].left_out);
   }
-}
-
-/// The matrix's own uncertainty, for forces in any direction.
-TEST(Crosstalk, CovarianceCoversTheForces) {
-  const unsigned seed = 600;
-  std::cout << "seeds " << seed << " and following\n";
-  SyntheticTable truth = both_ways();
-  truth.noise = 0.01;
-  constexpr int kTrials = 500;
-  int held = 0;
-  for (unsigned trial = 0; trial < kTrials; ++trial) {
-    std::mt19937 engine(seed + trial);
-    const CrosstalkFit fit = fit_crosstalk(truth.take(engine));
-    const Eigen::Vector3d force(6, -4, 3);
-    const auto back =
-        fit.forces(truth.matrix * force + truth.even * force.cwiseAbs(), Eigen::Vector3d::Zero());
-    const double z = (back.force_N[1] - force[1]) / std::sqrt(back.covariance(1, 1));
-    held += std::abs(z) <= student_t_quantile(0.975, fit.dof) ? 1 : 0;
-  }
-  std::cout << fmt::format("coverage {:.2f} %\n", 100.0 * held / kTrials);
-  EXPECT_GE(held, 0.93 * kTrials);
-  EXPECT_LE(held, 0.97 * kTrials);
 }
 
 TEST(Crosstalk, RefusesWhatDoesNotDetermineTheMatrix) {
