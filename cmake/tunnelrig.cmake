@@ -29,8 +29,8 @@ macro(tunnelrig_optimise_less)
   add_compile_options($<$<CONFIG:Release>:-O1>)
 endmacro()
 
-# And for the verbs: templates of options and JSON take most of the time there, twice as long where sanitizers instrument what an
-# optimiser has inlined.
+# And for the verbs and the tests: templates of options, JSON and assertions take most of the time there, twice as long where
+# sanitizers instrument what an optimiser has inlined.
 macro(tunnelrig_optimise_least)
   tunnelrig_optimise_less()
   add_compile_options($<$<CONFIG:RelWithDebInfo>:-O0>)
