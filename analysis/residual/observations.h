@@ -101,6 +101,11 @@ struct RunScatter {
     Eigen::VectorXd runs = {};
   } by_condition = {};
 
+  /// Whether nothing was found.
+  bool alike() const {
+    return !rotors_differ() && runs.size() == 0 && by_condition.names.empty() &&
+           run_correlation == std::array<double, 2>{0, 0};
+  }
   bool rotors_differ() const { return rotors.size() > 0 || contrasts.size() > 0 || !sessions.rotors.empty(); }
   /// Of some runs, by all of these; 1 where all are alike.
   Eigen::VectorXd of_runs(const std::vector<int>& rows) const;

@@ -60,25 +60,22 @@ bool is_beyond_floor(const Observations& observations, const ErrorEstimate& esti
          (ratio > kFarAboveFloor && ratio * ratio > chi2_quantile(kCertain, blocks) / blocks);
 }
 
-HeldOutErrors score(const Observations& observations, const JointFit& fit, const NullFit& variances,
-                    const std::vector<int>& fit_rows, const std::vector<int>& test_rows) {
+HeldOutErrors score(const Observations& observations, const JointFit& fit, const std::vector<int>& fit_rows,
+                    const std::vector<int>& test_rows) {
   const Components y = difference(response_components(observations), fit.linear.offset);
-  return predict_held_out(observations, y, fit.linear.columns, variances, fit_rows, test_rows);
+  return predict_held_out(observations, y, fit.linear.columns, fit.variances, fit_rows, test_rows);
 }
 
 /// Errors of the fitted runs, each block predicted from the others.
-HeldOutErrors left_out(const Observations& observations, const JointFit& fit, const NullFit& variances,
-                       const std::vector<int>& rows) {
+HeldOutErrors left_out(const Observations& observations, const JointFit& fit, const std::vector<int>& rows) {
   const Components y = difference(response_components(observations), fit.linear.offset);
-  return cross_validate(observations, y, fit.linear.columns, variances, rows).all();
+  return cross_validate(observations, y, fit.linear.columns, fit.variances, rows).all();
 }
 
 /// The named terms as they were found beside the curves: fitted without them, they would take up what the
 /// curves describe.
-JointFit without_curves(const Attribution& found, const std::vector<int>& rows) {
-  JointFit fit = found.final;
+JointFit without_curves(JointFit fit, const Observations& observations, const std::vector<int>& rows) {
   fit.model.curves.clear();
-  const Observations& observations = found.observations;
   fit.linear = linearise(observations, fit.model, predict_forces(observations, fit.model, rows));
   fit.linear.columns.clear();
   fit.variances = CandidateScan(MixedModel(observations, rows), {}, {})
@@ -121,7 +118,7 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
                        .whitened = {},
                        .amplitude = {}};
   if (observations.blocks() > 1) {
-    const HeldOutErrors predicted = left_out(observations, fit, fit.variances, rows);
+    const HeldOutErrors predicted = left_out(observations, fit, rows);
     if (predicted.count() > 0) errors = predicted;
   }
   set_interval(observations, errors, {}, settings.seed, explanation.before);
@@ -130,7 +127,7 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
       scale_of(observations) *
       detectable_by_one(MixedModel(observations, rows, fit.variances.ratio), fit.variances, settings.alpha);
   // Too few blocks for an effect are enough to see a typing error.
-  const HeldOutErrors fitted = score(observations, fit, fit.variances, rows, rows);
+  const HeldOutErrors fitted = score(observations, fit, rows, rows);
   explanation.suspect_rows = gross_rows(
       observations,
       suspect_rows(observations, fitted, fit.variances, degrees_of_freedom(observations, fit, rows)));
@@ -199,10 +196,33 @@ Explanation begin_explanation(const Observations& observations) {
   return explanation;
 }
 
+/// A model with the scatter that its fit to the open runs allows for.
+struct Fitted {
+  Observations data;
+  JointFit fit;
+};
+
+/// Whichever predicts open blocks from the others better.
+Fitted better_of(Fitted one, Fitted other, const std::vector<int>& open) {
+  const auto unseen = [&](const Fitted& model) { return rms(left_out(model.data, model.fit, open).error); };
+  return unseen(other) < unseen(one) ? std::move(other) : std::move(one);
+}
+
+/// What "before" is of: the baseline with the scatter that the search has found of the runs, or as it is
+/// fitted where nobody has searched. Weights made of what the baseline lacks would make it look worse than it
+/// is.
+Fitted fairest_baseline(const Observations& given, const Observations& alone, const Attribution& found,
+                        const std::vector<int>& open) {
+  Fitted with_scatter{alone, found.baseline};
+  if (alone.scatter.alike()) return with_scatter;
+  return better_of(std::move(with_scatter), {given, fit_jointly(given, {}, open)}, open);
+}
+
 /// What is held against what: the data with what the search gave groups of their own, and without.
 struct Models {
   const Observations& wide;
   const Observations& alone;
+  const Fitted& baseline;
   const Attribution& found;
 };
 
@@ -235,51 +255,61 @@ std::vector<int> rows_to_score(const MeanModel& model, const Seal& seal, const O
   return scored;
 }
 
+/// What "after" is of: the names alone. Without any it is what "before" is of.
+Fitted names_alone(const Models& models, const std::vector<int>& open) {
+  const auto& [wide, alone, baseline, found] = models;
+  if (found.accepted.empty()) return baseline;
+  if (found.curves.empty()) return {wide, found.final};
+  const auto with_scatter = [&](RunScatter scatter) {
+    Fitted names{wide, {}};
+    names.data.scatter = std::move(scatter);
+    names.fit = without_curves(found.final, names.data, open);
+    return names;
+  };
+  if (wide.scatter.alike()) return with_scatter({});
+  return better_of(with_scatter(wide.scatter), with_scatter({}), open);
+}
+
 /// The seal is opened: nothing that was decided before changes any more. Curves have no name, so they are not
 /// part of "after" unless they are asked for.
 void open_seal(const Models& models, const Seal& seal, const SearchSettings& settings,
                Explanation& explanation) {
-  const auto& [wide, alone, found] = models;
-  const JointFit named = found.curves.empty()     ? found.final
-                         : found.accepted.empty() ? found.baseline
-                                                  : without_curves(found, seal.open);
-  const JointFit& shown = settings.empirical ? found.final : named;
+  const auto& [wide, alone, baseline, found] = models;
+  const Fitted named = names_alone(models, seal.open);
+  const Fitted shown = settings.empirical ? Fitted{wide, found.final} : named;
   if (settings.empirical)
     for (const FoundCurve& found_curve : found.curves)
       explanation.empirical.push_back(found_curve.curve.label());
-  const std::vector<int> scored = rows_to_score(named.model, seal, alone, explanation);
-  const HeldOutErrors before = score(alone, found.baseline, named.variances, seal.open, scored);
-  const HeldOutErrors after = score(wide, shown, shown.variances, seal.open, scored);
+  const std::vector<int> scored = rows_to_score(named.fit.model, seal, alone, explanation);
+  const auto errors = [&](const Fitted& model) { return score(model.data, model.fit, seal.open, scored); };
+  const HeldOutErrors before = errors(baseline), after = errors(shown);
   if (before.count() == 0)
     throw InputError(
         "no row that is held out can be scored: each stands alone in a group that has no other rows; "
         "hold out others");
-  const auto with_interval = [&](const HeldOutErrors& sealed, const Observations& data, const JointFit& fit,
-                                 const NullFit& variances, ErrorEstimate& estimate) {
-    set_interval(models.alone, sealed, left_out(data, fit, variances, seal.open), settings.seed, estimate);
+  const auto with_interval = [&](const HeldOutErrors& sealed, const Fitted& model, ErrorEstimate& estimate) {
+    set_interval(alone, sealed, left_out(model.data, model.fit, seal.open), settings.seed, estimate);
   };
-  with_interval(before, alone, found.baseline, named.variances, explanation.before);
-  with_interval(after, wide, shown, shown.variances, explanation.after);
-  const bool all_shown = settings.empirical || found.curves.empty();
-  const HeldOutErrors whole =
-      all_shown ? after : score(wide, found.final, found.final.variances, seal.open, scored);
+  with_interval(before, baseline, explanation.before);
+  with_interval(after, shown, explanation.after);
+  const Fitted final{wide, found.final};
+  const HeldOutErrors whole = errors(final);
   HeldOutErrors curves = before;
   if (!found.curves.empty()) {
     const JointFit fit = fit_jointly(alone, {.terms = {}, .curves = found.final.model.curves}, seal.open);
-    curves = score(alone, fit, fit.variances, seal.open, scored);
+    curves = score(alone, fit, seal.open, scored);
   }
-  explanation.sealed = {.names = rms(score(wide, named, named.variances, seal.open, scored).error),
+  explanation.sealed = {.names = rms(errors(named).error),
                         .curves = rms(curves.error),
                         .all = rms(whole.error),
                         .against_names = speak_against(whole, curves),
                         .against_adopted = speak_against(after, before)};
   explanation.noise_floor = rms(whole.expected_std);
-  ErrorEstimate all = explanation.after;
-  if (!all_shown)  // with the curves, whose structure is said
-    with_interval(whole, wide, found.final, found.final.variances, all);
+  ErrorEstimate all;  // with the curves, whose structure is said
+  with_interval(whole, final, all);
   explanation.sealed.beyond_floor = is_beyond_floor(alone, all, explanation.noise_floor, scored);
-  explanation.before.rmse = rms(residuals(alone, found.baseline, seal.open));
-  explanation.after.rmse = rms(residuals(wide, shown, seal.open));
+  explanation.before.rmse = rms(residuals(baseline.data, baseline.fit, seal.open));
+  explanation.after.rmse = rms(residuals(shown.data, shown.fit, seal.open));
 }
 
 /// Names are settled, but a structure that the open blocks are too few for is one all the same.
@@ -301,16 +331,15 @@ void report_structure_left(const StructureLeft& left, const Observations& observ
 void estimate_on_all(const Models& models, const Observations& observations,
                      const std::vector<const Effect*>& effects, const SearchSettings& settings,
                      Explanation& explanation) {
-  const auto& [wide, alone, found] = models;
+  const auto& [wide, alone, baseline, found] = models;
   const std::vector<int> rows = observations.all_rows();
   std::vector<ChangePoint> change_points;
   const JointFit whole =
       fit_jointly(wide, with_change_points_of_all(wide, found.final.model, change_points), rows);
-  const JointFit whole_baseline = fit_jointly(alone, {}, rows);
   explanation.model = whole.model;
   explanation.scatter = wide.scatter;
-  explanation.residual_before = residuals(alone, whole_baseline, rows);
-  const HeldOutErrors fitted = score(wide, whole, whole.variances, rows, rows);
+  explanation.residual_before = residuals(baseline.data, fit_jointly(baseline.data, {}, rows), rows);
+  const HeldOutErrors fitted = score(wide, whole, rows, rows);
   explanation.residual_after = fitted.error;
   report_adopted(wide, found, whole, rows, explanation);
   for (const ChangePoint& point : change_points) {
@@ -369,7 +398,8 @@ Explanation explain_once(const Observations& observations, const std::vector<con
   report_untestable(alone, effects, rows, explanation);
   warn_of_scatter(found.observations, explanation);
   report_search(found, observations, settings, explanation);
-  const Models models{found.observations, alone, found};
+  const Fitted baseline = fairest_baseline(observations, alone, found, seal.open);
+  const Models models{found.observations, alone, baseline, found};
   open_seal(models, seal, settings, explanation);
   settings.progress("estimating parameters");
   estimate_on_all(models, observations, effects, settings, explanation);

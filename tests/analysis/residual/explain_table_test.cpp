@@ -2,6 +2,7 @@
 #include "analysis/residual/explain_program.h"
 
 #include <cmath>
+#include <numeric>
 
 #include <gmock/gmock.h>
 
@@ -66,6 +67,34 @@ TEST_F(ExplainTable, AZeroThatWasNotTakenOffIsDrawnOverTheForce) {
   ASSERT_EQ(e["adopted"].size(), 1u);
   EXPECT_EQ(e["adopted"][0]["effect"], "zero_offset");
   EXPECT_THAT(read_text(folder / "e.html"), HasSubstr(R"("covariate":"predicted F","covariate_unit":"N")"));
+}
+
+/// What the runs scatter by is found beside all that was found. Where the baseline lacks a curve, weights
+/// made of what it leaves would pull it away from the plain mean, and "before" would be worse than it is.
+TEST_F(ExplainTable, TheErrorBeforeIsNoWorseThanThatOfTheMean) {
+  std::string csv = "key,late,f,y\n";
+  std::vector<double> early, late;
+  for (int block = 0; block < 24; ++block)
+    for (int i = 0; i < 8 + block * 5 % 7; ++i) {
+      const double decades = 2.3 + 0.7 * (block * 7 % 24) / 24 + 0.1 * i;
+      const double y = 100 - 30 * std::pow(decades - 2.9, 2) + normal(0.5);
+      const bool is_late = block >= 18;
+      (is_late ? late : early).push_back(y);
+      csv += fmt::format("k{},{},{:.1f},{:.3f}\n", block, is_late ? 1 : 0, std::pow(10, decades), y);
+    }
+  write_text(folder / "t.csv", csv);
+  write_text(folder / "t.toml",
+             "format = \"tunnelrig-table/1\"\nname = \"t\"\nblocks = \"key\"\nhold_out = \"late > 0.5\"\n"
+             "[response]\ncolumn = \"y\"\nunit = \"1\"\n[[covariates]]\ncolumn = \"f\"\nunit = \"Hz\"\n"
+             "[[covariates]]\ncolumn = \"late\"\nunit = \"1\"\n");
+  ASSERT_EQ(import_table().code, 0);
+  const json e = explained();
+  EXPECT_EQ(e["verdict"], "unknown");
+  const double mean = std::accumulate(early.begin(), early.end(), 0.0) / static_cast<double>(early.size());
+  double squares = 0;
+  for (const double y : late) squares += std::pow(y - mean, 2) / static_cast<double>(late.size());
+  EXPECT_LT(e["before"]["held_out_rmse"], 1.03 * std::sqrt(squares));
+  EXPECT_EQ(e["after"], e["before"]);
 }
 
 TEST_F(ExplainTable, ConstantOrEmptyResponsesAreRefused) {
