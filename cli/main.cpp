@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <iostream>
 #include <string>
 #include <system_error>
 
@@ -25,8 +26,14 @@ int report(const std::string& text, int code) {
 }
 
 int cannot_print() {
-  return report(fmt::format("standard output cannot be written: {}", std::generic_category().message(errno)),
+  return report(fmt::format("standard output cannot be written{}{}", errno != 0 ? ": " : "",
+                            errno != 0 ? std::generic_category().message(errno) : ""),
                 kBadInput);
+}
+
+/// Also where a recording has flushed in between, and gone on: what it has is worth more than what it says.
+bool could_print() {
+  return std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.flush().good();
 }
 
 /// What a text would be a number of, and is none: CLI11 reads it, and every range lets it pass.
@@ -48,11 +55,12 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     const bool asked_for_help = error.get_exit_code() == 0;
     app.exit(error);
-    return asked_for_help ? kWell : kBadInput;
+    if (!asked_for_help) return kBadInput;
+    return could_print() ? kWell : cannot_print();
   }
   refuse_nan(app);
   const int code = work();
-  return std::fflush(stdout) == 0 ? code : cannot_print();
+  return could_print() ? code : cannot_print();
 }
 
 }  // namespace

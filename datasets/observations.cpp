@@ -2,6 +2,7 @@
 
 #include "datasets/error.h"
 #include "datasets/meanings.h"
+#include "datasets/table_dates.h"
 
 #include <algorithm>
 #include <cmath>
@@ -160,7 +161,7 @@ void store_table(const ObservationTable& table, const std::filesystem::path& fil
 
 ObservationTable read_table(const std::filesystem::path& csv, const std::filesystem::path& schema) {
   const TableSchema parsed = parse_table_schema(read_text(schema), schema.string());
-  return read_observations(read_csv(csv), parsed);
+  return read_observations(with_days_for_dates(read_csv(csv), parsed), parsed);
 }
 
 }  // namespace tunnelrig

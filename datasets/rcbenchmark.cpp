@@ -196,7 +196,8 @@ ObservationTable read_rcbenchmark(const std::filesystem::path& source, const Swe
   const std::string toml =
       options.schema.empty() ? sweep_schema(all, read, options, source.string()) : read_text(options.schema);
   const std::string name = options.schema.empty() ? "the headers' schema" : options.schema.string();
-  return read_observations(all, parse_table_schema(toml, name));
+  const TableSchema parsed = parse_table_schema(toml, name);
+  return read_observations(with_days_for_dates(std::move(all), parsed), parsed);
 }
 
 }  // namespace tunnelrig

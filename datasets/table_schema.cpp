@@ -234,9 +234,9 @@ TableSchema parse_table_schema(const std::string& text, const std::string& file)
   const Reader of_response(*response, "response.", schema.file);
   of_response.only({"column", "unit", "meaning", "scatter"});
   schema.response = of_response.column();
-  if (schema.response.unit == kTextUnit)
-    throw InputError::at(file, of_response.line_of("unit"),
-                         "response.unit is \"text\"; a response is a number");
+  if (schema.response.unit == kTextUnit || schema.response.unit == kDateUnit)
+    throw InputError::at(file, of_response.line_of("unit"), "response.unit is \"{}\"; a response is a number",
+                         schema.response.unit);
   schema.scatter = of_response.string("scatter").value_or("");
   if (!schema.scatter.empty() && schema.scatter != "relative" && schema.scatter != "absolute")
     throw InputError::at(file, of_response.line_of("scatter"),

@@ -14,10 +14,12 @@ constexpr double kGravity = 9.80665;   // m/s², standard
 constexpr double kPound = 0.45359237;  // kg
 constexpr double kPi = std::numbers::pi;
 
-constexpr std::array<Unit, 95> kUnits = {{
+constexpr std::array<Unit, 97> kUnits = {{
     {"1", "number", 1, 0},
     {"", "number", 1, 0},
     {kTextUnit, "text", 1, 0},
+    {"days", "date", 1, 0},
+    {kDateUnit, "date", 1, 0},
     {"%", "number", 0.01, 0},
     {"N", "force", 1, 0},
     {"mN", "force", 1e-3, 0},

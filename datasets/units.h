@@ -21,6 +21,9 @@ struct Unit {
 /// Of a column that holds no numbers: which battery, whose blades.
 inline constexpr std::string_view kTextUnit = "text";
 
+/// Of a column of dates, which is kept in days since its earliest (table_dates.h).
+inline constexpr std::string_view kDateUnit = "date";
+
 /// The unit of that name ("gf", "rpm", "in", "degC", "%", …); throws InputError listing what is known.
 const Unit& unit_from_name(std::string_view name);
 

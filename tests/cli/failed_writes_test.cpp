@@ -72,7 +72,7 @@ TEST_F(FailedWrites, OfAnExportNameTheTarget) {
 }
 
 /// A recording's log may lie on the disk that is full, or go to a terminal that is gone.
-TEST_F(FailedWrites, OfWhatIsSaidOnStandardErrorEndNothing) {
+TEST_F(FailedWrites, OfWhatIsSaidEndNothing) {
   const auto code_of = [&](const std::string& arguments) {
     const int status = std::system(  // NOLINT(concurrency-mt-unsafe)
         fmt::format("cd '{}' && '{}' {}", folder.path().string(), TUNNELRIG_PROGRAM, arguments).c_str());
@@ -82,6 +82,10 @@ TEST_F(FailedWrites, OfWhatIsSaidOnStandardErrorEndNothing) {
     EXPECT_EQ(code_of("plan --repeats 1 2>" + where), 2) << where;
     EXPECT_EQ(code_of("log --db c.db --location OT --session S1 --duration 2.5 >/dev/null 2>" + where), 0)
         << "2.5 s are long enough for a line of progress: " << where;
+    EXPECT_EQ(
+        code_of("log --db c.db --location OT --session S1 --duration 1 --speed max 2>/dev/null >" + where), 2)
+        << "the recording is whole, what was to be said of it is not";
+    EXPECT_EQ(code_of("--help 2>/dev/null >" + where), 2);
   }
   const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
   for (const RawRun& run : raw_runs(file)) EXPECT_EQ(run.state, RunState::kComplete);

@@ -11,7 +11,12 @@ namespace tunnelrig {
 namespace {
 
 using test::message_of;
+using testing::AllOf;
 using testing::HasSubstr;
+
+struct TableFiles : testing::Test {
+  test::TemporaryFolder folder;
+};
 
 const char* const kSchema = R"TOML(format = "tunnelrig-table/1"
 name = "bench"
@@ -58,6 +63,33 @@ TEST(Observations, ConvertsToSi) {
   EXPECT_NEAR(table.rows[0].diameter_m.value(), 0.254, 1e-12);
   EXPECT_NEAR(table.rows[1].air_temperature_C, 27, 1e-9);
   EXPECT_EQ(table.schema.hold_out, "N > 5000");
+}
+
+TEST_F(TableFiles, DatesAreDaysSinceTheEarliest) {
+  const std::string schema =
+      "format = \"tunnelrig-table/1\"\n[response]\ncolumn = \"F\"\nunit = \"N\"\n"
+      "[[covariates]]\ncolumn = \"when\"\nunit = \"date\"\n";
+  write_text(folder / "s.toml", schema);
+  write_text(folder / "t.csv",
+             "when,F\n2026-03-02T12:00:00Z,1\n2026-03-01,2\n,3\n2026-03-01 18:00:00+02:00,4\n");
+  const ObservationTable table = read_table(folder / "t.csv", folder / "s.toml");
+  EXPECT_EQ(table.sheet.number(0, "when"), 1.5);
+  EXPECT_EQ(table.sheet.number(1, "when"), 0);
+  EXPECT_EQ(table.sheet.number(2, "when"), std::nullopt);
+  EXPECT_NEAR(table.sheet.number(3, "when").value(), 16. / 24, 1e-9);
+  EXPECT_EQ(table.schema.covariates[0].kept_unit(), "days");
+  store_table(table, folder / "t.db", false);
+  const ObservationTable stored = observations_of(CampaignFile(folder / "t.db", CampaignFile::Access::kRead));
+  EXPECT_EQ(stored.sheet.number(0, "when"), 1.5);
+  write_text(folder / "t.csv", "when,F\n2026-03-02,1\n2.3.2026,2\n");
+  EXPECT_THAT(message_of([&] { read_table(folder / "t.csv", folder / "s.toml"); }),
+              AllOf(HasSubstr("t.csv:3"), HasSubstr("'2.3.2026' is no date")));
+  EXPECT_THAT(message_of([&] {
+                parse_table_schema(
+                    "format = \"tunnelrig-table/1\"\n[response]\ncolumn = \"F\"\nunit = \"date\"\n",
+                    "s.toml");
+              }),
+              HasSubstr("a response is a number"));
 }
 
 TEST(Observations, NamesWhatIsWrong) {
