@@ -257,8 +257,9 @@ std::vector<int> rows_to_score(const MeanModel& model, const Seal& seal, const O
 
 /// What "after" is of: the names alone. Without any it is what "before" is of.
 Fitted names_alone(const Models& models, const std::vector<int>& open) {
-  const auto& [wide, alone, baseline, found] = models;
-  if (found.accepted.empty()) return baseline;
+  const Observations& wide = models.wide;
+  const Attribution& found = models.found;
+  if (found.accepted.empty()) return models.baseline;
   if (found.curves.empty()) return {wide, found.final};
   const auto with_scatter = [&](RunScatter scatter) {
     Fitted names{wide, {}};
@@ -276,7 +277,8 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
                Explanation& explanation) {
   const auto& [wide, alone, baseline, found] = models;
   const Fitted named = names_alone(models, seal.open);
-  const Fitted shown = settings.empirical ? Fitted{wide, found.final} : named;
+  const Fitted all_found{wide, found.final};
+  const Fitted& shown = settings.empirical && !found.curves.empty() ? all_found : named;
   if (settings.empirical)
     for (const FoundCurve& found_curve : found.curves)
       explanation.empirical.push_back(found_curve.curve.label());
@@ -288,12 +290,11 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
         "no row that is held out can be scored: each stands alone in a group that has no other rows; "
         "hold out others");
   const auto with_interval = [&](const HeldOutErrors& sealed, const Fitted& model, ErrorEstimate& estimate) {
-    set_interval(alone, sealed, left_out(model.data, model.fit, seal.open), settings.seed, estimate);
+    set_interval(models.alone, sealed, left_out(model.data, model.fit, seal.open), settings.seed, estimate);
   };
   with_interval(before, baseline, explanation.before);
   with_interval(after, shown, explanation.after);
-  const Fitted final{wide, found.final};
-  const HeldOutErrors whole = errors(final);
+  const HeldOutErrors whole = errors(all_found);
   HeldOutErrors curves = before;
   if (!found.curves.empty()) {
     const JointFit fit = fit_jointly(alone, {.terms = {}, .curves = found.final.model.curves}, seal.open);
@@ -306,7 +307,7 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
                         .against_adopted = speak_against(after, before)};
   explanation.noise_floor = rms(whole.expected_std);
   ErrorEstimate all;  // with the curves, whose structure is said
-  with_interval(whole, final, all);
+  with_interval(whole, all_found, all);
   explanation.sealed.beyond_floor = is_beyond_floor(alone, all, explanation.noise_floor, scored);
   explanation.before.rmse = rms(residuals(baseline.data, baseline.fit, seal.open));
   explanation.after.rmse = rms(residuals(shown.data, shown.fit, seal.open));
