@@ -14,7 +14,9 @@
 #include <string>
 #include <system_error>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 namespace tunnelrig::cli {
 namespace {
@@ -63,11 +65,19 @@ int run(int argc, char** argv) {
   return could_print() ? code : cannot_print();
 }
 
+/// A stream that was closed (`>&-`) leaves its number to the next file that is opened, and what is printed
+/// would go into that. In its place stands what cannot be written.
+void hold_closed_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(stream, F_GETFD) == -1) ::open("/dev/null", O_RDONLY);
+}
+
 }  // namespace
 }  // namespace tunnelrig::cli
 
 int main(int argc, char** argv) {
   using namespace tunnelrig;
+  cli::hold_closed_streams();
   std::signal(SIGXFSZ, SIG_IGN);  // a file at its limit (ulimit -f) is a write that fails, like a full disk's
   cli::remember_arguments(argc, argv);
   try {

@@ -1,6 +1,7 @@
 #include "datasets/import_doubts.h"
 
 #include "datasets/locations.h"
+#include "datasets/open_space.h"
 #include "datasets/plausible.h"
 #include "datasets/run_columns.h"
 #include "datasets/unit_doubts.h"
@@ -8,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -76,6 +78,91 @@ void doubt_places(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doub
   }
 }
 
+/// A label of the tunnel's that is off its grid: the run would count as one outside.
+void doubt_labels_of_places(const CampaignInfo& info, const Sheet& sheet, const std::vector<Run>& runs,
+                            Doubts& doubts) {
+  if (!info.tunnel) return;
+  const auto nowhere = [](const Run& run) {
+    return run.kind == RunKind::kThrust && run.excluded.empty() && !run.in_tunnel() && !in_open_space(run);
+  };
+  const auto first = std::ranges::find_if(runs, nowhere);
+  if (first == runs.end()) return;
+  doubts.push_back(fmt::format(
+      "{}:{}: location '{}' is none of the tunnel's grid (H0 to H5, V-3 to V3) nor of open space (OS, GND…, "
+      "CEIL…), and has no y_norm and z_norm: {} {} in no tunnel",
+      sheet.file, first->line, first->location, std::ranges::count_if(runs, nowhere),
+      std::ranges::count_if(runs, nowhere) == 1 ? "run counts as" : "runs count as"));
+}
+
+/// Two days under one label, or a clock that jumped: what drifts within a session is measured from its first
+/// run.
+void doubt_sessions(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doubts) {
+  constexpr double kLongest_s = 24 * 3600;
+  std::map<std::string, std::pair<const Run*, const Run*>> ends;
+  for (const Run& run : runs) {
+    auto& [first, last] = ends.try_emplace(run.session, &run, &run).first->second;
+    if (run.start_s < first->start_s) first = &run;
+    if (run.start_s > last->start_s) last = &run;
+  }
+  for (const auto& [session, span] : ends) {
+    const auto& [first, last] = span;
+    if (last->start_s - first->start_s <= kLongest_s) continue;
+    doubts.push_back(
+        fmt::format("{}:{} and {}:{}: session {} goes on from {} to {}; a session is one set-up on one day: "
+                    "are its times "
+                    "right?",
+                    sheet.file, first->line, sheet.file, last->line, session, format_utc(first->start_s),
+                    format_utc(last->start_s)));
+  }
+}
+
+/// Runs of one value on end.
+struct Stretch {
+  std::size_t first = 0, length = 0;
+};
+
+/// The longest stretch of a value other than 0 (a fan that is off has no speed).
+Stretch longest_stretch(const std::vector<std::pair<const Run*, double>>& read) {
+  Stretch longest, current;
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    const bool goes_on = i > 0 && read[i].second == read[i - 1].second;
+    current = goes_on ? Stretch{current.first, current.length + 1} : Stretch{i, 1};
+    if (current.length > longest.length && read[i].second != 0) longest = current;
+  }
+  return longest;
+}
+
+/// A reading that has another value in nearly every run, and then no more. What is set has few values.
+void doubt_stuck(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doubts) {
+  constexpr std::size_t kFewest = 8;   // runs of one value
+  constexpr double kMostlyNew = 0.75;  // of the other runs' values
+  std::vector<const Run*> in_time;
+  std::set<std::string> columns;
+  for (const Run& run : runs) {
+    if (run.kind != RunKind::kThrust || !run.excluded.empty()) continue;
+    in_time.push_back(&run);
+    for (const auto& [column, value] : run.numbers) columns.insert(column);
+  }
+  std::ranges::stable_sort(in_time, {}, &Run::start_s);
+  for (const std::string& column : columns) {
+    std::vector<std::pair<const Run*, double>> read;
+    for (const Run* run : in_time)
+      if (const auto value = run->number(column)) read.emplace_back(run, *value);
+    const Stretch stuck = longest_stretch(read);
+    if (stuck.length < kFewest || read.size() < stuck.length + kFewest) continue;
+    std::set<double> values;
+    for (const auto& [run, value] : read) values.insert(value);
+    if (static_cast<double>(values.size()) < kMostlyNew * static_cast<double>(read.size() - stuck.length))
+      continue;
+    const auto& [first, value] = read[stuck.first];
+    doubts.push_back(fmt::format(
+        "{}:{} to {}:{}, column {}: {:g} in {} runs on end, and another value in nearly every other run: was "
+        "the sensor stuck?",
+        sheet.file, first->line, sheet.file, read[stuck.first + stuck.length - 1].first->line, column, value,
+        stuck.length));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& runs_sheet,
@@ -90,6 +177,9 @@ std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& ru
   });
   if (!cause_said) doubt_thrusts(info, runs_sheet, runs, doubts);
   doubt_places(runs_sheet, runs, doubts);
+  doubt_labels_of_places(info, runs_sheet, runs, doubts);
+  doubt_sessions(runs_sheet, runs, doubts);
+  doubt_stuck(runs_sheet, runs, doubts);
   return doubts;
 }
 

@@ -356,7 +356,11 @@ void estimate_on_all(const Models& models, const Observations& observations,
   warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);
   for (const FoundCurve& curve : found.curves)
     explanation.unknown.push_back(describe(wide, whole, curve, rows));
-  report_structure_left(structure_left(found, rows, effects, settings), wide, rows, explanation);
+  // A step that was sealed stands where all runs put it: elsewhere it would leave a structure.
+  Attribution in_place = found;
+  in_place.final = whole;
+  for (std::size_t t = 0; t < found.accepted.size(); ++t) in_place.accepted[t].term = whole.model.terms[t];
+  report_structure_left(structure_left(in_place, rows, effects, settings), wide, rows, explanation);
   if (found.session_unknown && explanation.unknown.empty())
     explanation.unknown.push_back(
         describe_sessions(observations, fitted.error, *found.session_unknown, rows));

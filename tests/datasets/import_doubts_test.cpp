@@ -1,5 +1,7 @@
 #include "datasets/import_doubts.h"
 
+#include <algorithm>
+#include <functional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -9,6 +11,8 @@
 namespace tunnelrig {
 namespace {
 
+using testing::AllOf;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -51,6 +55,45 @@ TEST(ImportDoubts, ATextAmongNumbersMakesALabel) {
               ElementsAre(HasSubstr("runs.csv:4: column fan_rpm: '3,5' is no number, as 5 other cells are")));
   EXPECT_THAT(doubts(kToml, runs("propeller", {"1", "2", "spare", "3", "4", "spare"})), IsEmpty())
       << "many texts are labels";
+}
+
+/// Of 24 runs, an hour apart, six in a session.
+std::string day_by_day(const std::function<double(int)>& temperature_C, double hours_between = 1) {
+  std::string csv =
+      "run,location,repeat,session,start_utc,raw,thrust_1_N,thrust_2_N,thrust_3_N,thrust_4_N,air_temperature_"
+      "C\n";
+  for (int r = 0; r < 24; ++r)
+    csv +=
+        fmt::format("R{},H1V1,{},S{},{},,7,7,7,7,{}\n", r, r + 1, r / 6,
+                    format_utc(1.77e9 + 86400. * (r / 6) + 3600 * hours_between * (r % 6)), temperature_C(r));
+  return csv;
+}
+
+TEST(ImportDoubts, ASensorThatIsStuck) {
+  EXPECT_THAT(doubts(kToml, day_by_day([](int r) { return 20 + 0.1 * r; })), IsEmpty());
+  EXPECT_THAT(
+      doubts(kToml, day_by_day([](int r) { return 20 + 0.1 * std::min(r, 14); })),
+      ElementsAre(HasSubstr("runs.csv:16 to runs.csv:25, column air_temperature_C: 21.4 in 10 runs on end")));
+  EXPECT_THAT(doubts(kToml, day_by_day([](int r) { return r < 12 ? 20 + r % 3 : 20; })), IsEmpty())
+      << "few values are settings";
+}
+
+TEST(ImportDoubts, ASessionOfSeveralDays) {
+  EXPECT_THAT(doubts(kToml, day_by_day([](int r) { return 20 + 0.1 * r; }, 5)),
+              Contains(HasSubstr("session S0 goes on from")));
+}
+
+TEST(ImportDoubts, ALocationOffTheGrid) {
+  std::string csv = day_by_day([](int r) { return 20 + 0.1 * r; });
+  for (const char* label : {"H-4V0", "H1V4", "door"}) {
+    std::string off = csv;
+    off.replace(off.find("H1V1"), 4, label);
+    EXPECT_THAT(doubts(kToml, off),
+                ElementsAre(AllOf(HasSubstr(fmt::format("runs.csv:2: location '{}'", label)),
+                                  HasSubstr("1 run counts as in no tunnel"))));
+  }
+  csv.replace(csv.find("H1V1"), 4, "GND2");
+  EXPECT_THAT(doubts(kToml, csv), IsEmpty());
 }
 
 TEST(ImportDoubts, AColumnThatIsOursButForCapitals) {
