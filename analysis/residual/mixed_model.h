@@ -106,10 +106,11 @@ class MixedModel {
 
   /// How far each run is, over σ and its own scatter, from what the model with `columns` says of it without
   /// that run (over 1 − h); runs × modes, rms 1; of each stratum, empty of a course. `residual`: what they
-  /// leave. `sigma`: of each stratum.
+  /// leave. `sigma`: of each stratum. `as_they_are`: runs that are as far as their residual.
   std::vector<Eigen::MatrixXd> sizes_left(const std::vector<std::size_t>& ratio,
                                           const std::vector<double>& sigma, const Components& residual,
                                           const std::vector<Components>& columns,
+                                          const std::vector<Eigen::Index>& as_they_are,
                                           std::mt19937_64& random) const;
   /// `sets` of them, of unit σ and one ratio.
   Stacked simulate_unit(std::size_t stratum, std::size_t ratio, std::size_t sets, double run_correlation,

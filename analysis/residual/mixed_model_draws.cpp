@@ -41,6 +41,7 @@ Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sig
 std::vector<MatrixXd> MixedModel::sizes_left(const std::vector<std::size_t>& ratio,
                                              const std::vector<double>& sigma, const Components& residual,
                                              const std::vector<Components>& columns,
+                                             const std::vector<Index>& as_they_are,
                                              std::mt19937_64& random) const {
   constexpr std::size_t kSets = 200;
   constexpr double kLeastLeft = 0.05;  // of the only run at a location, nothing
@@ -63,6 +64,9 @@ std::vector<MatrixXd> MixedModel::sizes_left(const std::vector<std::size_t>& rat
     project(s, ratio[s], alike);
     Eigen::VectorXd own = alike.array().square().rowwise().mean();  // 1 − h
     if (!items.empty()) own -= (projected[s] * covariance).cwiseProduct(projected[s]).rowwise().sum();
+    for (const Index run : as_they_are)
+      for (Index mode = 0; mode < strata_[s].modes; ++mode)
+        own(run + mode * static_cast<Index>(rows_.size())) = 1;
     const Eigen::VectorXd size = left.col(0).cwiseAbs().cwiseQuotient(own.cwiseMax(kLeastLeft));
     result[s] = Eigen::Map<const MatrixXd>(size.data(), static_cast<Index>(rows_.size()), strata_[s].modes);
     result[s] *= std::sqrt(static_cast<double>(size.size())) / size.norm();

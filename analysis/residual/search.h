@@ -128,6 +128,9 @@ class Search {
   /// the runs is none. Nothing of few runs, whose signs make too few data sets.
   std::vector<Eigen::MatrixXd> sizes_beside(const JointFit& fit, const Candidate& candidate,
                                             const CandidateFit& found) const;
+  /// Whether a candidate has most of its evidence from the other runs.
+  bool is_found_without(const std::vector<Eigen::Index>& runs, const JointFit& fit,
+                        const Candidate& candidate, const CandidateFit& found) const;
   /// What chance makes of a scan on top of a fit, whose best candidate counts as no scatter. Refers to
   /// `scan`.
   NullMaxima maxima_of(const JointFit& fit, const Scan& scan, std::uint64_t salt) const;

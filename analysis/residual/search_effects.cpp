@@ -115,15 +115,6 @@ bool Search::add_best_effect() {
   return added;
 }
 
-std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Candidate& candidate,
-                                                  const CandidateFit& found) const {
-  constexpr Index kFewest = 20;
-  if (mixed_->dof(0) < kFewest) return {};
-  const Components residual = without(difference(y_, fit.linear.offset), candidate.columns, found.amplitude);
-  std::mt19937_64 random(settings_.seed * 1000003 + 6000);
-  return mixed_->sizes_left(fit.variances.ratio, fit.variances.sigma, residual, candidate.columns, random);
-}
-
 NullMaxima Search::maxima_of(const JointFit& fit, const Scan& scan, std::uint64_t salt) const {
   const std::size_t best = scan.order[0];
   return {*scan.scan, fit.variances, sizes_beside(fit, scan.candidates[best], scan.fits[best]), settings_,

@@ -5,7 +5,9 @@
 #include "analysis/residual/run_correlation.h"
 #include "analysis/residual/search.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tunnelrig {
 namespace {
@@ -16,7 +18,57 @@ bool are_alike(const Eigen::VectorXd& scatter, const Eigen::VectorXd& other) {
          (scatter.size() == 0 || (scatter.cwiseQuotient(other).array().log().abs() < kAlike).all());
 }
 
+/// Runs so far off that data sets with them would be made by them alone, the furthest first. `sizes`: rms 1.
+std::vector<Eigen::Index> far_runs(const std::vector<Eigen::MatrixXd>& sizes, std::size_t most) {
+  constexpr double kFar = 5;
+  std::vector<std::pair<double, Eigen::Index>> far;
+  for (const Eigen::MatrixXd& of_stratum : sizes)
+    for (Eigen::Index run = 0; run < of_stratum.rows(); ++run)
+      if (const double size = of_stratum.row(run).maxCoeff(); size > kFar) far.emplace_back(size, run);
+  std::sort(far.rbegin(), far.rend());
+  std::vector<Eigen::Index> runs;
+  for (const auto& [size, run] : far)
+    if (runs.size() < most && std::find(runs.begin(), runs.end(), run) == runs.end()) runs.push_back(run);
+  return runs;
+}
+
 }  // namespace
+
+std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Candidate& candidate,
+                                                  const CandidateFit& found) const {
+  constexpr Eigen::Index kFewest = 20;
+  constexpr std::size_t kMostFar = 3;
+  if (mixed_->dof(0) < kFewest) return {};
+  const Components residual = without(difference(y_, fit.linear.offset), candidate.columns, found.amplitude);
+  const auto sizes = [&](const std::vector<Eigen::Index>& as_they_are) {
+    std::mt19937_64 random(settings_.seed * 1000003 + 6000);
+    return mixed_->sizes_left(fit.variances.ratio, fit.variances.sigma, residual, candidate.columns,
+                              as_they_are, random);
+  };
+  auto result = sizes({});
+  // Where a condition has one value far out, a curve that is only nearly right is far off without that run.
+  const std::vector<Eigen::Index> far = far_runs(result, kMostFar);
+  return far.empty() || !is_found_without(far, fit, candidate, found) ? result : sizes(far);
+}
+
+bool Search::is_found_without(const std::vector<Eigen::Index>& runs, const JointFit& fit,
+                              const Candidate& candidate, const CandidateFit& found) const {
+  constexpr double kMost = 0.7;
+  constexpr Eigen::Index kMostColumns = 24;
+  const Eigen::Index channels = y_[0].cols();
+  if (static_cast<Eigen::Index>(runs.size()) * channels > kMostColumns) return false;
+  Components nothing;
+  for (const Eigen::MatrixXd& component : y_)
+    nothing.push_back(Eigen::MatrixXd::Zero(component.rows(), component.cols()));
+  std::vector<Components> columns = fit.linear.columns;
+  for (const Eigen::Index run : runs)
+    for (Eigen::Index channel = 0; channel < channels; ++channel) {
+      columns.push_back(nothing);
+      columns.back()[0](run, channel) = 1;
+    }
+  const CandidateScan scan(*mixed_, columns, {candidate});
+  return scan.fit(difference(y_, fit.linear.offset))[0].evidence > kMost * found.evidence;
+}
 
 Search::ScatterBeside Search::scatter_beside(const CurveScan& curves, double least_evidence,
                                              std::mt19937_64& random) const {

@@ -271,7 +271,7 @@ TEST(MixedModel, SizesThatAreLeftAreAlikeWhereRunsAre) {
     for (int set = 0; set < kSets; ++set) {
       const Components residual = {MatrixXd(model.simulate_unit(0, 0, 1, correlation, random))};
       const Components candidate = {MatrixXd(model.simulate_unit(0, 0, 1, 0, random))};
-      const MatrixXd sizes = model.sizes_left({0}, {1.0}, residual, {candidate}, random)[0];
+      const MatrixXd sizes = model.sizes_left({0}, {1.0}, residual, {candidate}, {}, random)[0];
       for (Eigen::Index run = 0; run < sizes.rows(); ++run)
         (run % kRuns == 0 ? first : others) += std::pow(sizes(run, 0), 2);
     }
