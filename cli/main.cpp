@@ -35,6 +35,7 @@ int cannot_print() {
 
 /// Also where a recording has flushed in between, and gone on: what it has is worth more than what it says.
 bool could_print() {
+  errno = 0;  // of what failed before, the reason is not kept
   return std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.flush().good();
 }
 
