@@ -28,9 +28,8 @@ int report(const std::string& text, int code) {
 }
 
 int cannot_print() {
-  return report(fmt::format("standard output cannot be written{}{}", errno != 0 ? ": " : "",
-                            errno != 0 ? std::generic_category().message(errno) : ""),
-                kBadInput);
+  const std::string reason = errno != 0 ? ": " + std::generic_category().message(errno) : "";
+  return report("standard output cannot be written" + reason, kBadInput);
 }
 
 /// Also where a recording has flushed in between, and gone on: what it has is worth more than what it says.

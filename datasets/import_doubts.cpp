@@ -86,12 +86,12 @@ void doubt_labels_of_places(const CampaignInfo& info, const Sheet& sheet, const 
     return run.kind == RunKind::kThrust && run.excluded.empty() && !run.in_tunnel() && !in_open_space(run);
   };
   const auto first = std::ranges::find_if(runs, nowhere);
-  if (first == runs.end()) return;
+  const auto count = std::count_if(first, runs.end(), nowhere);
+  if (count == 0) return;
   doubts.push_back(fmt::format(
       "{}:{}: location '{}' is none of the tunnel's grid (H0 to H5, V-3 to V3) nor of open space (OS, GND…, "
       "CEIL…), and has no y_norm and z_norm: {} {} in no tunnel",
-      sheet.file, first->line, first->location, std::ranges::count_if(runs, nowhere),
-      std::ranges::count_if(runs, nowhere) == 1 ? "run counts as" : "runs count as"));
+      sheet.file, first->line, first->location, count, count == 1 ? "run counts as" : "runs count as"));
 }
 
 /// Two days under one label, or a clock that jumped: what drifts within a session is measured from its first
@@ -109,8 +109,7 @@ void doubt_sessions(const Sheet& sheet, const std::vector<Run>& runs, Doubts& do
     if (last->start_s - first->start_s <= kLongest_s) continue;
     doubts.push_back(
         fmt::format("{}:{} and {}:{}: session {} goes on from {} to {}; a session is one set-up on one day: "
-                    "are its times "
-                    "right?",
+                    "are its times right?",
                     sheet.file, first->line, sheet.file, last->line, session, format_utc(first->start_s),
                     format_utc(last->start_s)));
   }

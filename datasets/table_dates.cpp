@@ -4,6 +4,7 @@
 #include "datasets/error.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -25,9 +26,7 @@ Sheet with_days_for_dates(Sheet sheet, const TableSchema& schema) {
   constexpr double kDay_s = 24 * 3600;
   for (const TableColumn& column : schema.covariates) {
     if (column.unit != kDateUnit) continue;
-    sheet.require(column.column);
-    const auto place = static_cast<std::size_t>(
-        std::find(sheet.columns.begin(), sheet.columns.end(), column.column) - sheet.columns.begin());
+    const std::size_t place = sheet.require(column.column);
     std::vector<std::pair<std::size_t, double>> times;
     for (std::size_t row = 0; row < sheet.rows.size(); ++row)
       if (!sheet.text(row, column.column).empty())

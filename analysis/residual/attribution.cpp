@@ -36,12 +36,13 @@ Attribution Search::run() {
   return std::move(result_);
 }
 
-StructureLeft Search::run_on_top_of(const Attribution& found) {
+StructureLeft Search::run_on_top_of(const Attribution& found, const JointFit& whole) {
   make_models();
   list_ways();
   result_.accepted = found.accepted;
   result_.curves = found.curves;
-  fit_ = fit_jointly(observations_, found.final.model, rows_);
+  fit_ = whole;
+  read_back_terms();
   constexpr std::uint64_t kOther = 2000;
   salt_ = kOther;  // other data sets than the search before has drawn
   StructureLeft left;
@@ -147,9 +148,9 @@ Attribution attribute(const Observations& observations, const std::vector<int>& 
   return Search(observations, rows, effects, settings).run();
 }
 
-StructureLeft structure_left(const Attribution& found, const std::vector<int>& rows,
+StructureLeft structure_left(const Attribution& found, const JointFit& whole, const std::vector<int>& rows,
                              const std::vector<const Effect*>& effects, const SearchSettings& settings) {
-  return Search(found.observations, rows, effects, settings).run_on_top_of(found);
+  return Search(found.observations, rows, effects, settings).run_on_top_of(found, whole);
 }
 
 }  // namespace tunnelrig

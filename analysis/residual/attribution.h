@@ -107,9 +107,9 @@ struct StructureLeft {
   std::vector<Round> rounds;   // of the search
   std::set<std::size_t> bent;  // of `accepted`: what its covariate does bends away from its formula
 };
-/// `found` speaks of its own observations, which must outlive the call. `effects`: what the structure could
-/// be.
-StructureLeft structure_left(const Attribution& found, const std::vector<int>& rows,
+/// `found` speaks of its own observations, which must outlive the call. `whole`: its model fitted to `rows`,
+/// a step where these put it: elsewhere it would leave a structure. `effects`: what the structure could be.
+StructureLeft structure_left(const Attribution& found, const JointFit& whole, const std::vector<int>& rows,
                              const std::vector<const Effect*>& effects, const SearchSettings& settings);
 
 }  // namespace tunnelrig

@@ -278,7 +278,8 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
   const auto& [wide, alone, baseline, found] = models;
   const Fitted named = names_alone(models, seal.open);
   const Fitted all_found{wide, found.final};
-  const Fitted& shown = settings.empirical && !found.curves.empty() ? all_found : named;
+  const bool all_shown = found.curves.empty() ? !found.accepted.empty() : settings.empirical;
+  const Fitted& shown = all_shown ? all_found : named;
   if (settings.empirical)
     for (const FoundCurve& found_curve : found.curves)
       explanation.empirical.push_back(found_curve.curve.label());
@@ -294,7 +295,7 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
   };
   with_interval(before, baseline, explanation.before);
   with_interval(after, shown, explanation.after);
-  const HeldOutErrors whole = errors(all_found);
+  const HeldOutErrors whole = all_shown ? after : errors(all_found);
   HeldOutErrors curves = before;
   if (!found.curves.empty()) {
     const JointFit fit = fit_jointly(alone, {.terms = {}, .curves = found.final.model.curves}, seal.open);
@@ -306,8 +307,8 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
                         .against_names = speak_against(whole, curves),
                         .against_adopted = speak_against(after, before)};
   explanation.noise_floor = rms(whole.expected_std);
-  ErrorEstimate all;  // with the curves, whose structure is said
-  with_interval(whole, all_found, all);
+  ErrorEstimate all = explanation.after;
+  if (!all_shown) with_interval(whole, all_found, all);  // with the curves, whose structure is said
   explanation.sealed.beyond_floor = is_beyond_floor(alone, all, explanation.noise_floor, scored);
   explanation.before.rmse = rms(residuals(baseline.data, baseline.fit, seal.open));
   explanation.after.rmse = rms(residuals(shown.data, shown.fit, seal.open));
@@ -356,11 +357,7 @@ void estimate_on_all(const Models& models, const Observations& observations,
   warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);
   for (const FoundCurve& curve : found.curves)
     explanation.unknown.push_back(describe(wide, whole, curve, rows));
-  // A step that was sealed stands where all runs put it: elsewhere it would leave a structure.
-  Attribution in_place = found;
-  in_place.final = whole;
-  for (std::size_t t = 0; t < found.accepted.size(); ++t) in_place.accepted[t].term = whole.model.terms[t];
-  report_structure_left(structure_left(in_place, rows, effects, settings), wide, rows, explanation);
+  report_structure_left(structure_left(found, whole, rows, effects, settings), wide, rows, explanation);
   if (found.session_unknown && explanation.unknown.empty())
     explanation.unknown.push_back(
         describe_sessions(observations, fitted.error, *found.session_unknown, rows));

@@ -21,8 +21,9 @@ class Search {
   Search(const Observations& observations, const std::vector<int>& rows,
          const std::vector<const Effect*>& effects, const SearchSettings& settings);
   Attribution run();
-  /// Curves alone, on top of what was found on other runs of the same observations.
-  StructureLeft run_on_top_of(const Attribution& found);
+  /// Curves alone, on top of what was found on other runs of the same observations; `whole`: its fit to
+  /// these.
+  StructureLeft run_on_top_of(const Attribution& found, const JointFit& whole);
 
  private:
   struct Scan {

@@ -4,7 +4,6 @@
 #include "calibration/load_cell.h"
 
 #include <cmath>
-#include <iostream>
 
 #include <gtest/gtest.h>
 

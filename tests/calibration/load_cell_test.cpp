@@ -3,7 +3,6 @@
 #include "calibration/points.h"
 
 #include <cmath>
-#include <iostream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

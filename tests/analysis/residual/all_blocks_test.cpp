@@ -70,7 +70,7 @@ TEST_F(AllBlocks, WhatTheyShowMayHaveAName) {
     SearchSettings nothing = test::quick();
     nothing.most_effects = nothing.most_curves = 0;
     const Attribution found = attribute(o, rows, {}, nothing);
-    return structure_left(found, rows, test::every_effect(), test::quick()).curves;
+    return structure_left(found, found.final, rows, test::every_effect(), test::quick()).curves;
   };
   const std::vector<FoundCurve> as_theory_says = names_of(true), otherwise = names_of(false);
   ASSERT_EQ(as_theory_says.size(), 1u);

@@ -34,6 +34,11 @@ struct ExplainTable : ExplainProgram {
     write_text(folder / "t.csv", csv);
     write_text(folder / "t.toml", schema + response + covariates);
   }
+  ProgramResult import_table(const std::string& csv, const std::string& toml) const {
+    write_text(folder / "t.csv", csv);
+    write_text(folder / "t.toml", toml);
+    return import_table();
+  }
   ProgramResult import_table() const {
     return run("import t.csv --format table --schema t.toml --db c.db --replace");
   }
@@ -59,12 +64,11 @@ TEST_F(ExplainTable, AZeroThatWasNotTakenOffIsDrawnOverTheForce) {
     csv += fmt::format("d{},{:.1f},{:.5f}\n", row / 8, rpm,
                        (6 * std::pow(rpm / 5000, 2) + 0.08) * (1 + normal(0.002)));
   }
-  write_text(folder / "t.csv", csv);
-  write_text(folder / "t.toml",
-             "format = \"tunnelrig-table/1\"\nname = \"t\"\nblocks = \"day\"\n[response]\ncolumn = \"F\"\n"
-             "unit = \"N\"\nmeaning = \"thrust_N\"\n[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n"
-             "[propeller]\ndiameter_m = 0.25\n");
-  ASSERT_EQ(import_table().code, 0);
+  const std::string toml =
+      "format = \"tunnelrig-table/1\"\nname = \"t\"\nblocks = \"day\"\n[response]\ncolumn = \"F\"\n"
+      "unit = \"N\"\nmeaning = \"thrust_N\"\n[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n"
+      "[propeller]\ndiameter_m = 0.25\n";
+  ASSERT_EQ(import_table(csv, toml).code, 0);
   const json e = explained("--html e.html");
   ASSERT_EQ(e["adopted"].size(), 1u);
   EXPECT_EQ(e["adopted"][0]["effect"], "zero_offset");
@@ -84,12 +88,11 @@ TEST_F(ExplainTable, TheErrorBeforeIsNoWorseThanThatOfTheMean) {
       (is_late ? late : early).push_back(y);
       csv += fmt::format("k{},{},{:.1f},{:.3f}\n", block, is_late ? 1 : 0, std::pow(10, decades), y);
     }
-  write_text(folder / "t.csv", csv);
-  write_text(folder / "t.toml",
-             "format = \"tunnelrig-table/1\"\nname = \"t\"\nblocks = \"key\"\nhold_out = \"late > 0.5\"\n"
-             "[response]\ncolumn = \"y\"\nunit = \"1\"\n[[covariates]]\ncolumn = \"f\"\nunit = \"Hz\"\n"
-             "[[covariates]]\ncolumn = \"late\"\nunit = \"1\"\n");
-  ASSERT_EQ(import_table().code, 0);
+  const std::string toml =
+      "format = \"tunnelrig-table/1\"\nname = \"t\"\nblocks = \"key\"\nhold_out = \"late > 0.5\"\n"
+      "[response]\ncolumn = \"y\"\nunit = \"1\"\n[[covariates]]\ncolumn = \"f\"\nunit = \"Hz\"\n"
+      "[[covariates]]\ncolumn = \"late\"\nunit = \"1\"\n";
+  ASSERT_EQ(import_table(csv, toml).code, 0);
   const json e = explained();
   EXPECT_EQ(e["verdict"], "unknown");
   const double mean = std::accumulate(early.begin(), early.end(), 0.0) / static_cast<double>(early.size());
@@ -120,11 +123,10 @@ TEST_F(ExplainTable, OneValueFarOutHidesNoWave) {
     csv += fmt::format("d{},{:.5f},{:.3f}\n", row / 10,
                        5 * (1 + 0.0044 * std::sin(1.9 * (x - 20))) * (1 + 0.004 * nearly_normal()), x);
   }
-  write_text(folder / "t.csv", csv);
-  write_text(folder / "t.toml",
-             "format = \"tunnelrig-table/1\"\nblocks = \"day\"\n[response]\ncolumn = \"F\"\nunit = \"N\"\n"
-             "[[covariates]]\ncolumn = \"x\"\nunit = \"mm\"\n");
-  ASSERT_EQ(import_table().code, 0);
+  const std::string toml =
+      "format = \"tunnelrig-table/1\"\nblocks = \"day\"\n[response]\ncolumn = \"F\"\nunit = \"N\"\n"
+      "[[covariates]]\ncolumn = \"x\"\nunit = \"mm\"\n";
+  ASSERT_EQ(import_table(csv, toml).code, 0);
   const json e = explained();
   ASSERT_EQ(e["unknown"].size(), 1u);
   EXPECT_EQ(e["unknown"][0]["covariate"], "x");
