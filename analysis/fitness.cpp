@@ -6,8 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <set>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 namespace tunnelrig {
 namespace {
@@ -83,7 +86,7 @@ class Fitness : public Findings {
   }
 
   void channels() {
-    Names stuck, dead, clipped, flagged, pattern, overloaded;
+    Names stuck, dead, clipped, flagged, erroneous, pattern, overloaded;
     for (const Run& run : data_.runs) {
       const auto statistics = data_.statistics.find(run.run);
       if (statistics == data_.statistics.end() || !run.excluded.empty()) continue;
@@ -91,10 +94,16 @@ class Fitness : public Findings {
       const bool counts = raw != data_.raw.end() && is_counts(raw->second.format.type);
       const auto ledger = raw == data_.raw.end() ? std::nullopt : ledger_of(file_, raw->second.id);
       if (ledger && ledger->frames_test_pattern > 0) pattern.add(run.run);
-      if (ledger && ledger->frames_clipped > 0)
-        flagged.add(fmt::format("{} ({:.2g} %)", run.run,
-                                100.0 * static_cast<double>(ledger->frames_clipped) /
-                                    static_cast<double>(ledger->frames_stored)));
+      const auto add_flagged = [&](Names& names, std::uint64_t frames) {
+        if (frames > 0)
+          names.add(
+              fmt::format("{} ({:.2g} %)", run.run,
+                          100.0 * static_cast<double>(frames) / static_cast<double>(ledger->frames_stored)));
+      };
+      if (ledger) {
+        add_flagged(flagged, ledger->frames_clipped);
+        add_flagged(erroneous, ledger->frames_adc_error);
+      }
       for (int rotor = 0; rotor < data_.info.rig.rotors; ++rotor) {
         const ChannelStatistics& channel = statistics->second.channels[static_cast<std::size_t>(rotor)];
         const std::string name = fmt::format("{} channel {}", run.run, rotor + 1);
@@ -125,6 +134,9 @@ class Fitness : public Findings {
     if (!flagged.empty())
       problem("channels", "the board flags frames as clipped: " + flagged.text(),
               "lower the amplifier's gain; clipped means are biased");
+    if (!erroneous.empty())
+      problem("channels", "the board flags frames as errors of its converter: " + erroneous.text(),
+              "exclude these runs and record them again");
     if (!pattern.empty())
       problem("channels", "the board's test pattern, no measurements: " + pattern.text(),
               "exclude these runs and record them again without the test pattern");
@@ -153,13 +165,14 @@ class Fitness : public Findings {
   }
 
   void speeds() {
-    Names off, disagree;
+    std::vector<std::pair<double, std::string>> far;  // by how much of nominal
+    Names disagree;
     const double nominal = data_.info.rig.nominal_speed_rpm;
     for (const Run& run : data_.runs) {
       const auto read = run.number("speed_rpm");
       if (run.kind != RunKind::kThrust || !read || !run.excluded.empty()) continue;
-      if (std::abs(*read / nominal - 1) > kSpeedTolerance)
-        off.add(fmt::format("{} ({:.0f})", run.run, *read));
+      if (const double by = std::abs(*read / nominal - 1); by > kSpeedTolerance)
+        far.emplace_back(by, fmt::format("{} ({:.0f})", run.run, *read));
       const auto statistics = data_.statistics.find(run.run);
       if (statistics == data_.statistics.end()) continue;
       for (const ChannelStatistics& channel : statistics->second.channels) {
@@ -168,9 +181,13 @@ class Fitness : public Findings {
         break;
       }
     }
+    std::ranges::stable_sort(far, std::greater{}, &std::pair<double, std::string>::first);
+    Names off;
+    for (const auto& [by, run] : far) off.add(run);
     if (!off.empty())
       note("speed",
-           fmt::format("further than {:.0f} rev/min from nominal: {}", kSpeedTolerance * nominal, off.text()),
+           fmt::format("further than {:.0f} rev/min from nominal, the furthest first: {}",
+                       kSpeedTolerance * nominal, off.text()),
            "set the speed again; `reduce --with rotor_speed` uses the measured one");
     if (!disagree.empty())
       problem("speed", "shaft line and tachometer disagree in " + disagree.text(),

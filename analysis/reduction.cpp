@@ -39,9 +39,9 @@ std::string set_conditions(const Run& run, const CampaignInfo& info, const Model
 
 void read_thrusts_from_volts(const CampaignData& data, const Run& run, const RunStatistics& statistics,
                              const Certificate& certificate, const Tares& tares, RunCoefficients& result) {
-  const double frames = static_cast<double>(statistics.frames);
   result.from_volts = true;
-  result.tare = tares.zero_at(run.session, run.start_s + 0.5 * frames / data.info.daq.sample_rate_hz);
+  result.tare =
+      tares.zero_at(run.session, run.start_s + 0.5 * statistics.elapsed_s(data.info.daq.sample_rate_hz));
   for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
     const auto i = static_cast<std::size_t>(rotor);
     const ChannelStatistics& channel = statistics.channels[i];
@@ -93,9 +93,9 @@ Tares tares_of(const CampaignData& data) {
   std::vector<TareReading> readings;
   for (const std::size_t r : tare_runs(data)) {
     const Run& run = data.runs[r];
-    const std::vector<ChannelStatistics>& channels = data.statistics.at(run.run).channels;
-    const double half_s =
-        0.5 * static_cast<double>(data.raw.at(run.run).frames) / data.info.daq.sample_rate_hz;
+    const RunStatistics& statistics = data.statistics.at(run.run);
+    const std::vector<ChannelStatistics>& channels = statistics.channels;
+    const double half_s = 0.5 * statistics.elapsed_s(data.info.daq.sample_rate_hz);
     TareReading reading{.session = run.session, .time_s = run.start_s + half_s, .run = run.run};
     for (std::size_t c = 0; c < std::min<std::size_t>(channels.size(), kMaxRotors); ++c) {
       reading.mean_V[c] = channels[c].mean_V;

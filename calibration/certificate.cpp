@@ -53,10 +53,14 @@ class Gatekeeper {
   void check_shape() {
     const CellChecks& checks = fit_.checks;
     if (checks.lack_of_fit) {
-      const double off = checks.linearity ? checks.linearity->max_deviation_percent_of_span : 0;
-      add("lack of fit", checks.lack_of_fit->p >= limits_.test_p || off <= limits_.effect_percent_of_span,
-          "F = {:.3g}, p = {:.2g}, up to {:.2f} % of span", checks.lack_of_fit->f, checks.lack_of_fit->p,
-          off);
+      // Of two forces only, loaded and unloaded, there is no line to be off from, and p decides alone.
+      const bool small = checks.linearity &&
+                         checks.linearity->max_deviation_percent_of_span <= limits_.effect_percent_of_span;
+      add("lack of fit", checks.lack_of_fit->p >= limits_.test_p || small, "F = {:.3g}, p = {:.2g}{}",
+          checks.lack_of_fit->f, checks.lack_of_fit->p,
+          checks.linearity
+              ? fmt::format(", up to {:.2f} % of span", checks.linearity->max_deviation_percent_of_span)
+              : "");
     }
     if (checks.linearity) {
       const double bow = 100 * checks.linearity->bow_N / fit_.span_N();

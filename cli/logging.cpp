@@ -279,6 +279,11 @@ int Logging::report(const std::string& name, const PlannedRun& planned, const Lo
                      ledger.frames_test_pattern));
     problem = true;
   }
+  if (ledger.frames_adc_error > 0) {
+    warn(fmt::format("run {}: the board flags {} frames as errors of the converter", name,
+                     ledger.frames_adc_error));
+    problem = true;
+  }
   if (ledger.frames_clipped > 0) {
     warn(fmt::format("run {}: the board flags {} frames as clipped", name, ledger.frames_clipped));
     problem = true;

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -31,11 +32,19 @@ std::string inputs_json(const CampaignData& data, const Reduction& reduction) {
       .dump();
 }
 
+/// Without spectra the lines that are stored stay: effects of an adopted model may go by them.
+void keep_lines(const RunStatistics& stored, RunStatistics& computed) {
+  for (std::size_t c = 0; c < std::min(stored.channels.size(), computed.channels.size()); ++c) {
+    computed.channels[c].lines = stored.channels[c].lines;
+    computed.channels[c].shaft_hz = stored.channels[c].shaft_hz;
+  }
+}
+
 /// Recomputes what is stored of the raw data and says where the two differ; afterwards the new values count.
 /// True where all agreed.
 bool refresh_from_raw(const ReduceOptions& options, CampaignData& data) {
   ProgressBar bar("from raw");
-  const auto computed =
+  auto computed =
       statistics_from_raw(options.db, !options.no_spectra, [&bar](std::size_t done, std::size_t total) {
         bar.show(static_cast<double>(done), static_cast<double>(total),
                  fmt::format("run {} of {}", done, total));
@@ -49,7 +58,10 @@ bool refresh_from_raw(const ReduceOptions& options, CampaignData& data) {
     });
     tell(fmt::format("{}: the statistics of {} runs were stored anew\n", options.db, computed.size()));
   }
-  for (const auto& [run, statistics] : computed) data.statistics[run] = statistics;
+  for (auto& [run, statistics] : computed) {
+    if (options.no_spectra) keep_lines(data.statistics[run], statistics);
+    data.statistics[run] = std::move(statistics);
+  }
   return lines.empty();
 }
 

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <optional>
 #include <string_view>
@@ -193,6 +194,11 @@ std::unique_ptr<PacketSource> open_tcp(const std::string& name, std::string_view
   if (colon == std::string_view::npos || colon == 0 || colon + 1 == address.size()) {
     throw InputError::in(name, "write tcp:HOST:PORT");
   }
+  const std::string_view port = address.substr(colon + 1);
+  unsigned number = 0;  // what is above 65535 would count from 0 again
+  const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), number);
+  if (error != std::errc() || end != port.data() + port.size() || number < 1 || number > 65535)
+    throw InputError::in(name, "port {}: must be a number from 1 to 65535", port);
   auto source = std::make_unique<TcpSource>(name, std::string(address.substr(0, colon)),
                                             std::string(address.substr(colon + 1)));
   source->open_or_throw();

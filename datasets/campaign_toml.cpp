@@ -47,6 +47,16 @@ class Section {
     return value;
   }
 
+  /// The same, where only a whole number has a meaning.
+  std::optional<int> whole(std::string_view key, int lowest, int highest, std::string_view unit) {
+    const auto value = number(key, lowest, highest, unit);
+    if (!value) return {};
+    if (*value != std::round(*value))
+      throw InputError::at(file_, static_cast<int>(table_->get(key)->source().begin.line),
+                           "{}.{} = {:g}: must be a whole number", name_, key, *value);
+    return static_cast<int>(*value);
+  }
+
   double required(std::string_view key, double lowest, double highest, std::string_view unit) {
     if (const auto value = number(key, lowest, highest, unit)) return *value;
     throw InputError::at(file_, line_, "{}.{} [{}] is required", name_, key, unit);
@@ -79,8 +89,7 @@ toml::table parse_document(const std::string& text, const std::string& file) {
 
 Rig parse_rig(Section& section) {
   Rig rig;
-  const double rotors = section.number("rotors", 1, kMaxRotors, "rotors").value_or(kMaxRotors);
-  rig.rotors = static_cast<int>(std::lround(rotors));
+  rig.rotors = section.whole("rotors", 1, kMaxRotors, "rotors").value_or(kMaxRotors);
   rig.propeller_radius_m = section.required("propeller_radius_m", 0.005, 5, "m");
   const double disc = std::numbers::pi * rig.propeller_radius_m * rig.propeller_radius_m;
   rig.rotor_area_m2 = section.number("rotor_area_m2", 1e-5, 400, "m²").value_or(disc);
@@ -88,7 +97,7 @@ Rig parse_rig(Section& section) {
   rig.arm_length_m = section.number("arm_length_m", 0, 50, "m").value_or(0);
   rig.vehicle_width_m = section.number("vehicle_width_m", 0, 100, "m").value_or(0);
   rig.vehicle_height_m = section.number("vehicle_height_m", 0, 100, "m").value_or(0);
-  rig.blades = static_cast<int>(std::lround(section.number("blades", 1, 16, "blades").value_or(rig.blades)));
+  rig.blades = section.whole("blades", 1, 16, "blades").value_or(rig.blades);
   rig.cell_limit_N = section.number("cell_limit_N", 0.001, 1e6, "N").value_or(rig.cell_limit_N);
   rig.blade_chord_m = section.number("blade_chord_m", 1e-4, 2, "m").value_or(0);
   return rig;
@@ -107,8 +116,7 @@ Tunnel parse_tunnel(Section& section, const Rig& rig, const std::string& file) {
 Daq parse_daq(Section& section) {
   Daq daq;
   daq.sample_rate_hz = section.number("sample_rate_hz", 1, 1e6, "Hz").value_or(daq.sample_rate_hz);
-  daq.adc_bits =
-      static_cast<int>(std::lround(section.number("adc_bits", 1, 16, "bits").value_or(daq.adc_bits)));
+  daq.adc_bits = section.whole("adc_bits", 1, 16, "bits").value_or(daq.adc_bits);
   daq.adc_reference_V = section.number("adc_reference_V", 0.01, 100, "V").value_or(daq.adc_reference_V);
   daq.mains_hz = section.number("mains_hz", 1, 1000, "Hz").value_or(daq.mains_hz);
   return daq;

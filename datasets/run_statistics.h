@@ -2,6 +2,8 @@
 // read ever after.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -48,6 +50,13 @@ struct RunStatistics {
   double window_s = 0;
   std::vector<double>
       window_means_V;  // windows × channels, consecutive in time; NaN where every frame was lost
+
+  /// From the first frame to the last, lost ones between them included (to a window).
+  double elapsed_s(double sample_rate_hz) const {
+    const double stored_s = static_cast<double>(frames) / sample_rate_hz;
+    const std::size_t windows = channels.empty() ? 0 : window_means_V.size() / channels.size();
+    return windows == 0 ? stored_s : std::max(stored_s, static_cast<double>(windows - 1) * window_s);
+  }
 };
 
 }  // namespace tunnelrig

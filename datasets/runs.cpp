@@ -23,7 +23,7 @@ struct KnownColumn {
 };
 
 constexpr double kLarge = 1e12;
-constexpr std::array<KnownColumn, 15> kKnown = {{
+constexpr std::array<KnownColumn, 16> kKnown = {{
     {"y_norm", -1, 1, "normalised tunnel coordinates lie between -1 and 1"},
     {"z_norm", -1, 1, "normalised tunnel coordinates lie between -1 and 1"},
     {"ground_distance_R", 0, 10000, "a distance in propeller radii"},
@@ -39,6 +39,7 @@ constexpr std::array<KnownColumn, 15> kKnown = {{
     {"thrust_1_N", -kLarge, kLarge, "newtons"},
     {"thrust_2_N", -kLarge, kLarge, "newtons"},
     {"thrust_3_N", -kLarge, kLarge, "newtons"},
+    {"thrust_4_N", -kLarge, kLarge, "newtons"},
 }};
 
 /// Quantities that are often written in another unit; such a column in place of ours is a mistake, not a
@@ -134,7 +135,7 @@ Columns sort_columns(const Sheet& sheet) {
   for (std::size_t i = 0; i < sheet.columns.size(); ++i) {
     const std::string& name = sheet.columns[i];
     if (name.empty() || is_text_column(name)) continue;
-    const bool known = known_column(name) != nullptr || name == "thrust_4_N";
+    const bool known = known_column(name) != nullptr;
     (known || has_numbers(sheet, i) ? columns.numbers : columns.labels).push_back(i);
   }
   return columns;
@@ -229,9 +230,7 @@ std::string_view known_but_for_case(std::string_view column) {
     if (is_meant(known)) return known;
   for (const KnownColumn& known : kKnown)
     if (is_meant(known.name)) return known.name;
-  for (const char* known : {"thrust_4_N", "source"})
-    if (is_meant(known)) return known;
-  return {};
+  return is_meant("source") ? "source" : std::string_view();
 }
 
 CampaignInfo at_speed(CampaignInfo campaign, std::optional<double> measured_rpm) {

@@ -13,8 +13,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostFolds = 24;  // of the jackknife behind the explanation's intervals
-
 ModelTerm model_term(const AdoptedEffect& adopted, const Observations& observations) {
   ModelTerm term{.effect = adopted.term.effect,
                  .rotor = adopted.term.rotor,
@@ -54,7 +52,7 @@ ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Obse
 }
 
 double jackknife_dof(const Observations& observations) {
-  return std::max(1, std::min(observations.blocks(), kMostFolds) - 1);
+  return std::max(1, std::min(observations.blocks(), static_cast<int>(kMostFolds)) - 1);
 }
 
 /// Whether the joint fit has a column for a parameter.

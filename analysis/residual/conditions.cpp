@@ -199,6 +199,8 @@ void warn_of_changes_at_steps(const Observations& observations, Explanation& exp
       }
 }
 
+namespace {
+
 /// Of numbers that rows have: the names of those whose every row scatters more than most.
 std::vector<std::string> that_scatter(const Eigen::VectorXd& scatter, const std::vector<int>& number,
                                       const std::vector<std::string>& name) {
@@ -237,6 +239,8 @@ std::string unlike_contrasts(const Observations& observations) {
   return fmt::format("differences of rotors scatter unlike each other (over their geometric mean, rotors {})",
                      fmt::join(contrasts, ", "));
 }
+
+}  // namespace
 
 void warn_of_scatter(const Observations& observations, Explanation& explanation) {
   if (observations.scatter.contrasts.size() > 0)

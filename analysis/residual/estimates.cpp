@@ -6,8 +6,8 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <random>
-#include <set>
 
 namespace tunnelrig {
 
@@ -92,45 +92,76 @@ void set_interval(const Observations& observations, const HeldOutErrors& sealed,
   estimate.held_out_high = estimate.held_out_rmse * std::exp(up + half);
 }
 
+namespace {
+
+/// Every parameter with all rows, and with each fold's blocks left out: by term, then parameter.
+struct Jackknife {
+  MeanModel centre;
+  std::vector<std::vector<std::vector<double>>> values;  // by fold, last
+
+  double standard_error(std::size_t term, std::size_t parameter) const {
+    const std::vector<double>& of = values[term][parameter];
+    const double n = static_cast<double>(of.size());
+    const double mean = std::accumulate(of.begin(), of.end(), 0.0) / n;
+    double squares = 0;
+    for (const double value : of) squares += (value - mean) * (value - mean);
+    return std::sqrt((n - 1) / n * squares);
+  }
+};
+
+using Folds = std::vector<std::vector<int>>;  // of each the rows that are kept
+
+Folds leave_out_blocks(const Observations& observations, const std::vector<int>& rows) {
+  const std::map<int, std::size_t> fold_of = folds_of_blocks(observations, rows);
+  Folds folds(std::min(fold_of.size(), kMostFolds));
+  for (std::size_t fold = 0; fold < folds.size(); ++fold)
+    for (const int row : rows)
+      if (fold_of.at(observations.block[static_cast<std::size_t>(row)]) != fold) folds[fold].push_back(row);
+  return folds;
+}
+
+Jackknife jackknife(const Observations& observations, const MeanModel& model, const NullFit& variances,
+                    const std::vector<int>& rows, const Folds& folds) {
+  Jackknife result{refit(observations, model, variances, rows), {}};
+  for (const Term& term : model.terms) result.values.emplace_back(term.parameters.size());
+  for (const std::vector<int>& kept : folds) {
+    const MeanModel without = refit(observations, result.centre, variances, kept);
+    for (std::size_t t = 0; t < without.terms.size(); ++t)
+      for (std::size_t k = 0; k < without.terms[t].parameters.size(); ++k)
+        result.values[t][k].push_back(without.terms[t].parameters[k]);
+  }
+  return result;
+}
+
+}  // namespace
+
 std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observations& observations,
                                                                 const JointFit& fit,
                                                                 const std::vector<int>& rows) {
-  MeanModel free = fit.model;  // theory's coefficients are fitted too, to show what the data say of them
-  for (Term& term : free.terms)
-    if (!term.effect->theory_only) term.at_theory = false;
-  const MeanModel centre = refit(observations, free, fit.variances, rows);
-  std::vector<std::vector<std::vector<double>>> values(centre.terms.size());
-  for (std::size_t t = 0; t < values.size(); ++t) values[t].resize(centre.terms[t].parameters.size());
-  std::set<int> blocks;
-  for (const int row : rows) blocks.insert(observations.block[static_cast<std::size_t>(row)]);
-  const std::size_t folds = std::min<std::size_t>(blocks.size(), 24);
-  std::map<int, std::size_t> fold_of;
-  for (const int block : blocks) fold_of.emplace(block, fold_of.size() % folds);
-  for (std::size_t fold = 0; fold < folds; ++fold) {
-    std::vector<int> kept;
-    for (const int row : rows)
-      if (fold_of.at(observations.block[static_cast<std::size_t>(row)]) != fold) kept.push_back(row);
-    const MeanModel model = refit(observations, centre, fit.variances, kept);
-    for (std::size_t t = 0; t < values.size(); ++t)
-      for (std::size_t k = 0; k < values[t].size(); ++k) values[t][k].push_back(model.terms[t].parameters[k]);
-  }
-  std::vector<std::vector<ParameterEstimate>> result(values.size());
-  const double n = static_cast<double>(folds);
-  for (std::size_t t = 0; t < values.size(); ++t) {
-    for (std::size_t k = 0; k < values[t].size(); ++k) {
-      const EffectParameter& parameter = fit.model.terms[t].effect->parameters[k];
-      const double mean = std::accumulate(values[t][k].begin(), values[t][k].end(), 0.0) / n;
-      double squares = 0;
-      for (const double value : values[t][k]) squares += (value - mean) * (value - mean);
-      const double error = std::sqrt((n - 1) / n * squares);
-      const bool theory = k == 0 && fit.model.terms[t].at_theory;
-      const double value = theory ? fit.model.terms[t].parameters[k] : centre.terms[t].parameters[k];
-      const double middle = centre.terms[t].parameters[k], half = half_width_95(error, n - 1);
+  const Folds folds = leave_out_blocks(observations, rows);
+  const double dof = static_cast<double>(folds.size()) - 1;
+  const Jackknife found = jackknife(observations, fit.model, fit.variances, rows, folds);
+  std::vector<std::vector<ParameterEstimate>> result(fit.model.terms.size());
+  for (std::size_t t = 0; t < result.size(); ++t) {
+    const Term& term = fit.model.terms[t];
+    // Theory's coefficient is fitted as well, alone, to show what the data say of it.
+    std::optional<Jackknife> freed;
+    if (term.at_theory && !term.effect->theory_only) {
+      MeanModel free = fit.model;
+      free.terms[t].at_theory = false;
+      freed = jackknife(observations, free, fit.variances, rows, folds);
+    }
+    for (std::size_t k = 0; k < term.parameters.size(); ++k) {
+      const EffectParameter& parameter = term.effect->parameters[k];
+      const bool theory = k == 0 && term.at_theory;
+      const Jackknife& says = theory && freed ? *freed : found;
+      const double error = says.standard_error(t, k), half = half_width_95(error, dof);
+      const double middle = says.centre.terms[t].parameters[k];
       // No time is below zero. What an amplitude's interval says of its sign stays said.
       const bool bounded = parameter.role == ParameterRole::kShape;
       result[t].push_back({.name = parameter.name,
                            .unit = parameter.unit,
-                           .value = value,
+                           .value = found.centre.terms[t].parameters[k],
                            .low = bounded ? std::max(middle - half, parameter.lower) : middle - half,
                            .high = bounded ? std::min(middle + half, parameter.upper) : middle + half,
                            .standard_error = error,

@@ -86,14 +86,16 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
 
 /// What all runs say against a name that the open ones had let in; empty: nothing. Theory's coefficient is
 /// not the data's to refute.
-std::string refutation(const AdoptedEffect& adopted) {
+std::string refutation(const AdoptedEffect& adopted, const std::string& baseline_over) {
   if (adopted.term.effect->theory_only || adopted.term.at_theory) return "";
   const ParameterEstimate& amplitude = adopted.parameters[0];
   if (adopted.at_bound) return fmt::format("its {} is at its physical bound", amplitude.name);
   if (adopted.anywhere) return "when it happened is not known within half of the runs";
   if (adopted.bends_away)
     return fmt::format("what goes with {} bends away from its formula",
-                       fmt::join(adopted.term.effect->covariates, ", "));
+                       adopted.term.effect->covariates.empty()
+                           ? baseline_over  // of the force alone
+                           : fmt::format("{}", fmt::join(adopted.term.effect->covariates, ", ")));
   const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
   // Where groups have their own, these may be of either sign, and nothing on the whole.
   const bool nothing =
@@ -115,12 +117,23 @@ struct Refuted {
   bool any() const { return all || !terms.empty(); }
 };
 
-Refuted refuted(const Explanation& explanation) {
+bool curves_do_better(const Explanation& explanation) {
+  return worse(explanation.sealed.all, explanation.sealed.curves) && explanation.sealed.against_names;
+}
+
+/// Better than the names, whether what else was found is in or not.
+bool baseline_does_better(const Explanation& explanation) {
+  return worse(explanation.sealed.all, explanation.before.held_out_rmse) &&
+         worse(explanation.sealed.names, explanation.before.held_out_rmse) &&
+         explanation.sealed.against_adopted;
+}
+
+Refuted refuted(const Explanation& explanation, const std::string& baseline_over) {
   Refuted result;
   bool refutable = false;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     refutable = refutable || !adopted.term.effect->theory_only;
-    const std::string why = refutation(adopted);
+    const std::string why = refutation(adopted, baseline_over);
     if (why.empty()) continue;
     result.terms.push_back(adopted.term);
     result.why.push_back(why);
@@ -128,7 +141,7 @@ Refuted refuted(const Explanation& explanation) {
     result.structure |= adopted.bends_away || adopted.anywhere;
   }
   result.all = result.terms.empty() && refutable &&
-               worse(explanation.sealed.all, explanation.sealed.curves) && explanation.sealed.against_names;
+               (curves_do_better(explanation) || baseline_does_better(explanation));
   return result;
 }
 
@@ -139,7 +152,8 @@ std::string taken_back_all(const Explanation& explanation) {
   return fmt::format(
       "{} found and taken back: the error of the sealed blocks is {:.4g}{} with {}, {:.4g} without",
       fmt::join(names, ", "), explanation.sealed.all, explanation.unit_suffix(),
-      names.size() > 1 ? "them" : "it", explanation.sealed.curves);
+      names.size() > 1 ? "them" : "it",
+      curves_do_better(explanation) ? explanation.sealed.curves : explanation.before.held_out_rmse);
 }
 
 /// Once more without the names that are refuted: what they did may be structure whose cause is not known.
@@ -148,7 +162,8 @@ std::string taken_back_all(const Explanation& explanation) {
 Explanation without_refuted(Explanation explanation, const Observations& observations,
                             std::vector<const Effect*>& effects, SearchSettings& settings,
                             std::vector<std::string>& said) {
-  for (Refuted found = refuted(explanation); found.any(); found = refuted(explanation)) {
+  const std::string& over = observations.baseline_over;
+  for (Refuted found = refuted(explanation, over); found.any(); found = refuted(explanation, over)) {
     std::vector<const Effect*> fewer = effects;
     SearchSettings stricter = settings;
     stricter.taken_back.insert(stricter.taken_back.end(), found.terms.begin(), found.terms.end());

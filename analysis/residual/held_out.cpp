@@ -13,7 +13,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kMostFolds = 24;
 
 /// What the fit leaves for prediction: everything stratum by stratum.
 struct Fit {
@@ -47,11 +46,46 @@ Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vect
   return fit;
 }
 
+/// What runs scatter, σ² U Φ U of (2); neighbours are those of the same block among `rows`.
+class RunCovariance {
+ public:
+  RunCovariance(const Observations& observations, const std::vector<int>& rows, const VectorXd& scatter,
+                double sigma, double run_correlation)
+      : std_(sigma * scatter), place_(rows.size()), block_(rows.size()), correlation_(run_correlation) {
+    for (const auto& [block, runs] : places_of_each(observations.block, rows))
+      for (std::size_t i = 0; i < runs.size(); ++i) {
+        place_[static_cast<std::size_t>(runs[i])] = static_cast<double>(i);
+        block_[static_cast<std::size_t>(runs[i])] = block;
+      }
+  }
+
+  MatrixXd operator()(const std::vector<Index>& a, const std::vector<Index>& b) const {
+    return MatrixXd::NullaryExpr(static_cast<Index>(a.size()), static_cast<Index>(b.size()),
+                                 [&](Index i, Index j) {
+                                   return of(static_cast<std::size_t>(a[static_cast<std::size_t>(i)]),
+                                             static_cast<std::size_t>(b[static_cast<std::size_t>(j)]));
+                                 });
+  }
+
+ private:
+  double of(std::size_t a, std::size_t b) const {
+    if (block_[a] != block_[b]) return 0;
+    return std_(static_cast<Index>(a)) * std_(static_cast<Index>(b)) *
+           std::pow(correlation_, std::abs(place_[a] - place_[b]));
+  }
+
+  VectorXd std_;
+  std::vector<double> place_;  // of a run within its block
+  std::vector<int> block_;
+  double correlation_;
+};
+
 /// Where whole groups are held out, a group's constant and slopes are fitted to every other run of it; the
 /// rest is scored, if there are as many runs as coefficients. `residual` came with NaN there because the
-/// model has no such group: `plain` is the same without any baseline. `scatter`: of each run.
-void own_baseline(const Observations& observations, const std::vector<int>& rows, const VectorXd& scatter,
-                  const MatrixXd& plain, double sigma2, MatrixXd& residual, MatrixXd& variance) {
+/// model has no such group: `plain` is the same without any baseline. `covariance`: of what runs scatter.
+void own_baseline(const Observations& observations, const std::vector<int>& rows,
+                  const RunCovariance& covariance, const MatrixXd& plain, MatrixXd& residual,
+                  MatrixXd& variance) {
   for (auto& [group, members] : places_of_each(observations.group, rows)) {
     std::erase_if(members, [&](Index r) { return !std::isnan(residual(r, 0)); });
     std::vector<Index> fitted, scored;
@@ -62,16 +96,20 @@ void own_baseline(const Observations& observations, const std::vector<int>& rows
         x.row(static_cast<Index>(m)) << 1, observations.slopes.row(rows[static_cast<std::size_t>(of[m])]);
       return x;
     };
-    const VectorXd weight = scatter(fitted).cwiseInverse();
+    const MatrixXd of_fitted = covariance(fitted, fitted), shared = covariance(scored, fitted);
+    const VectorXd weight = of_fitted.diagonal().cwiseSqrt().cwiseInverse();
     const MatrixXd x = weight.asDiagonal() * design(fitted), wanted = design(scored);
     if (x.rows() < x.cols()) continue;
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(x);
-    const MatrixXd of_scatter = wanted * solver.pseudoInverse();  // of the fitted runs, each over its scatter
-    residual(scored, Eigen::all) =
-        plain(scored, Eigen::all) - of_scatter * weight.asDiagonal() * plain(fitted, Eigen::all);
-    for (std::size_t m = 0; m < scored.size(); ++m)
-      variance.row(scored[m]).setConstant(
-          sigma2 * (std::pow(scatter(scored[m]), 2) + of_scatter.row(static_cast<Index>(m)).squaredNorm()));
+    const MatrixXd share = wanted * solver.pseudoInverse() * weight.asDiagonal();  // of each fitted run
+    residual(scored, Eigen::all) = plain(scored, Eigen::all) - share * plain(fitted, Eigen::all);
+    // What a run shares with its neighbours is in the group's own constant as well.
+    for (std::size_t m = 0; m < scored.size(); ++m) {
+      const auto w = share.row(static_cast<Index>(m));
+      variance.row(scored[m]).setConstant(covariance({scored[m]}, {scored[m]})(0, 0) -
+                                          2 * w.dot(shared.row(static_cast<Index>(m))) +
+                                          w.dot(w * of_fitted));
+    }
   }
 }
 
@@ -146,8 +184,9 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     MatrixXd errors = Eigen::Map<const MatrixXd>(residual.data(), n, stratum.modes);
     MatrixXd variances = Eigen::Map<const MatrixXd>(variance.data(), n, stratum.modes);
     if (stratum.means() && (observations.groups_within_blocks || !observations.held_out.empty()))
-      own_baseline(observations, test_rows, scatter,
-                   Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes), sigma2, errors, variances);
+      own_baseline(observations, test_rows,
+                   RunCovariance(observations, test_rows, scatter, null.sigma[s], model.run_correlation(s)),
+                   Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes), errors, variances);
     parts.push_back(whitened(observations, test_rows, errors, scatter, null.sigma[s], kRatios[null.ratio[s]],
                              model.run_correlation(s)));
     if (!stratum.means()) continue;
@@ -169,13 +208,18 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
   return result;
 }
 
-CrossValidation cross_validate(const Observations& observations, const Components& y,
-                               const std::vector<Components>& columns, const NullFit& null,
-                               const std::vector<int>& rows) {
+std::map<int, std::size_t> folds_of_blocks(const Observations& observations, const std::vector<int>& rows) {
   std::map<int, std::size_t> fold_of;
   for (const int row : rows) fold_of.emplace(observations.block[static_cast<std::size_t>(row)], 0);
   std::size_t next = 0;
   for (auto& [block, fold] : fold_of) fold = next++ % kMostFolds;
+  return fold_of;
+}
+
+CrossValidation cross_validate(const Observations& observations, const Components& y,
+                               const std::vector<Components>& columns, const NullFit& null,
+                               const std::vector<int>& rows) {
+  const std::map<int, std::size_t> fold_of = folds_of_blocks(observations, rows);
   CrossValidation result;
   for (std::size_t fold = 0; fold < std::min(fold_of.size(), kMostFolds); ++fold) {
     std::vector<int> fit, test;

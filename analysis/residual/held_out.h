@@ -3,6 +3,8 @@
 
 #include "analysis/residual/likelihood.h"
 
+#include <cstddef>
+#include <map>
 #include <vector>
 
 namespace tunnelrig {
@@ -39,8 +41,11 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
                                const std::vector<Components>& columns, const NullFit& null,
                                const std::vector<int>& fit_rows, const std::vector<int>& test_rows);
 
-/// Leave-one-block-out over the blocks of `rows` (of at most `most` folds: blocks are dealt out where there
-/// are more).
+/// Blocks left out at a time, one each; of more blocks than this they are dealt out.
+inline constexpr std::size_t kMostFolds = 24;
+std::map<int, std::size_t> folds_of_blocks(const Observations& observations, const std::vector<int>& rows);
+
+/// Leave-one-block-out over the blocks of `rows`.
 struct CrossValidation {
   std::vector<HeldOutErrors> folds;
 

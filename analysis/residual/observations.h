@@ -169,7 +169,6 @@ struct Observations {
   std::vector<int> all_rows() const;
   /// v = b + g T of a cell: what it reads without a load is no force. A thrust over a condition has none.
   bool is_line() const { return line_of_cell; }
-  bool is_power_law() const { return baseline.starts_with("power:"); }
   const Covariate* find(std::string_view wanted) const {
     for (const Covariate& covariate : covariates)
       if (covariate.name == wanted) return &covariate;

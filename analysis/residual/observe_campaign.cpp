@@ -2,6 +2,7 @@
 #include "analysis/reduction.h"
 #include "analysis/residual/campaign_conditions.h"
 #include "datasets/error.h"
+#include "datasets/locations.h"
 #include "datasets/open_space.h"
 
 #include <algorithm>
@@ -125,6 +126,7 @@ void add_raw_covariates(const Source& source, Observations& result) {
   for (Index row = 0; row < source.rows(); ++row) missing += source.statistics(row) == nullptr ? 1 : 0;
   if (missing == source.rows()) return;
   const auto add = [&](const std::string& name, const auto& value_of) {
+    if (result.find(name) != nullptr) return;  // a column of runs.csv goes before
     Covariate covariate{name, MatrixXd::Constant(source.rows(), result.channels(), kNaN), true};
     for (Index row = 0; row < source.rows(); ++row)
       for (Index c = 0; c < result.channels() && source.statistics(row) != nullptr; ++c)
@@ -190,7 +192,7 @@ void add_derived_covariates(const Source& source, Observations& result) {
 
 /// Open space has one coefficient for all heights where the baseline says so.
 std::string group_of(const Run& run, const std::string& baseline) {
-  return baseline == "open_space" && in_open_space(run) ? kOpenSpace : run.location;
+  return baseline == "open_space" && in_open_space(run) ? kOpenSpace : canonical_location(run.location);
 }
 
 int index_in(std::vector<std::string>& names, const std::string& name) {
@@ -329,7 +331,7 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
   result.duration_s = Eigen::VectorXd::Zero(source.rows());
   for (Index row = 0; row < source.rows(); ++row)
     if (const RunStatistics* statistics = source.statistics(row))
-      result.duration_s(row) = static_cast<double>(statistics->frames) / data.info.daq.sample_rate_hz;
+      result.duration_s(row) = statistics->elapsed_s(data.info.daq.sample_rate_hz);
   add_sheet_covariates(source, result);
   add_texts(source, result);
   add_derived_covariates(source, result);

@@ -198,9 +198,9 @@ class Search {
   void find_confounded();
   /// One way of each other effect that α would let in and that predicts unseen blocks about as well.
   std::vector<Ranked> rivals(const Accepted& accepted, const JointFit& without, const Scan& scan) const;
+  static bool within_bounds(const Scan& scan, std::size_t i);
   /// The same for an effect with an amplitude of each group's own: each rival takes its place in the
   /// baseline.
-  static bool within_bounds(const Scan& scan, std::size_t i);
   std::vector<Ranked> rivals_in_groups(const Accepted& accepted) const;
   /// Effects that step 3 would accept in the newest curve's place, and that predict unseen blocks about as
   /// well. `without`: the fit without the curve.

@@ -304,8 +304,8 @@ void Search::set_detectable(const Scan& scan) {
   double largest = 0;
   for (std::size_t i = 0; i < names.size(); ++i) {
     Eigen::VectorXd own = amplitude.col(static_cast<Index>(i));
-    std::nth_element(own.begin(), own.begin() + kFourInFive, own.end());
-    const double needed = own(kFourInFive) * rms_of(typical[i].columns[0][0]);
+    std::nth_element(own.begin(), own.begin() + kFourInFive - 1, own.end());
+    const double needed = own(kFourInFive - 1) * rms_of(typical[i].columns[0][0]);
     if (!std::isfinite(needed)) continue;
     result_.detectable_by_effect[names[i]] = needed;
     largest = std::max(largest, needed);

@@ -54,9 +54,7 @@ std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Can
 bool Search::is_found_without(const std::vector<Eigen::Index>& runs, const JointFit& fit,
                               const Candidate& candidate, const CandidateFit& found) const {
   constexpr double kMost = 0.7;
-  constexpr Eigen::Index kMostColumns = 24;
   const Eigen::Index channels = y_[0].cols();
-  if (static_cast<Eigen::Index>(runs.size()) * channels > kMostColumns) return false;
   Components nothing;
   for (const Eigen::MatrixXd& component : y_)
     nothing.push_back(Eigen::MatrixXd::Zero(component.rows(), component.cols()));

@@ -37,11 +37,12 @@ const MatrixXd& cosines() {
   return table;
 }
 
-/// log u. Below a share that no force is left of it goes on straight: a model that takes more than the force
-/// itself is far off, but by a number.
+/// Of a force, the share below which a model takes more than the force itself: far off, but by a number.
+constexpr double kLeastShare = 0.02;
+
+/// log u, and straight on below the least share.
 EffectJet log_of_share(const EffectJet& u) {
-  constexpr double kLeast = 0.02;
-  return u.a >= kLeast ? log(u) : u / kLeast + (std::log(kLeast) - 1);
+  return u.a >= kLeastShare ? log(u) : u / kLeastShare + (std::log(kLeastShare) - 1);
 }
 
 class Evaluation {
@@ -79,15 +80,20 @@ class Evaluation {
     const double force = force_of(row, channel);
     const double duration = observations_.duration_s(row);
     if (!term_.effect->within_time() || duration == 0) {
-      put(row, channel, 0, change(sample, force), 1, response);
+      put(row, channel, 0, change(changed(sample, force), force), response);
       return;
     }
+    std::array<EffectJet, kShapes + 1> coefficient{};
+    const std::size_t components = within_ ? response.value.size() : 1;
     for (int t = 0; t < kTimes; ++t) {
       sample.time_s = duration * (t + 0.5) / kTimes;
-      const EffectJet at = change(sample, force);
-      for (std::size_t j = 0; j < (within_ ? response.value.size() : 1); ++j)
-        put(row, channel, j, at, cosines()(static_cast<Index>(j), t), response);
+      const EffectJet then = changed(sample, force);
+      for (std::size_t j = 0; j < components; ++j)
+        coefficient[j] += cosines()(static_cast<Index>(j), t) * then;
     }
+    put(row, channel, 0, change(coefficient[0], force), response);
+    for (std::size_t j = 1; j < components; ++j)
+      put(row, channel, j, over_mean(coefficient[j], coefficient[0], force), response);
   }
 
  private:
@@ -118,18 +124,28 @@ class Evaluation {
     return observations_.position.size() > 0 ? observations_.position(row) : static_cast<double>(row);
   }
 
-  /// log(F'/F) where the model is multiplicative, F' − F where it is not.
-  EffectJet change(const Sample& sample, double force) const {
-    const EffectJet changed = term_.effect->jet_N(sample, parameters_, EffectJet(force));
+  EffectJet changed(const Sample& sample, double force) const {
+    return term_.effect->jet_N(sample, parameters_, EffectJet(force));
+  }
+
+  /// log(F'/F) where the model is multiplicative, F' − F where it is not: F' the run's mean, as measured.
+  EffectJet change(const EffectJet& changed, double force) const {
     return observations_.multiplicative ? log_of_share(changed / force) : changed - force;
   }
 
-  static void put(Index row, Index channel, std::size_t component, const EffectJet& change, double weight,
+  /// A course is measured over the run's own mean.
+  EffectJet over_mean(const EffectJet& coefficient, const EffectJet& mean, double force) const {
+    if (!observations_.multiplicative) return coefficient;
+    const double least = kLeastShare * force;
+    return mean.a >= least ? coefficient / mean : coefficient / least;
+  }
+
+  static void put(Index row, Index channel, std::size_t component, const EffectJet& value,
                   TermResponse& response) {
-    response.value[component](row, channel) += weight * change.a;
+    response.value[component](row, channel) = value.a;
     for (std::size_t k = 0; k < response.derivative.size(); ++k)
       if (!response.derivative[k].empty())
-        response.derivative[k][component](row, channel) += weight * change.v[static_cast<Index>(k)];
+        response.derivative[k][component](row, channel) = value.v[static_cast<Index>(k)];
   }
 
   const Term& term_;
@@ -290,6 +306,8 @@ Testability testability(const Effect& effect, const Observations& observations) 
   if (observations.of_no_quantity && !observations.is_line() && is_of_air_or_of_a_cell_in_it(effect))
     result.reason =
         "the response is a number without a unit: nothing says that a cell read it, or that the air is in it";
+  if (effect.name == "axial_wind" && observations.of_no_quantity)
+    result.reason = "nothing says that the response is a rotor's, through which the wind would go";
   if (effect.name == "tip_mach" && observations.from_table) {
     if (observations.find(kDiameter) == nullptr) result.missing.emplace_back(kDiameter);
     if (const auto why = observations.not_usable.find(std::string(kDiameter));

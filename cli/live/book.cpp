@@ -59,7 +59,7 @@ CellKnowledge cells_of(const CampaignData& data) {
     CellKnowledge::Tare tare;
     const auto source = run.labels.find("source");
     tare.simulated = source != run.labels.end() && source->second.starts_with("virtual");
-    tare.end_s = run.start_s + static_cast<double>(raw->second.frames) / data.info.daq.sample_rate_hz;
+    tare.end_s = run.start_s + statistics->second.elapsed_s(data.info.daq.sample_rate_hz);
     const auto rotors = static_cast<std::size_t>(data.info.rig.rotors);
     for (std::size_t c = 0; c < std::min(rotors, statistics->second.channels.size()); ++c) {
       tare.mean_V[c] = statistics->second.channels[c].mean_V;

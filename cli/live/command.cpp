@@ -1,5 +1,6 @@
 #include "cli/live/command.h"
 
+#include "daq/run_plan.h"
 #include "datasets/campaign.h"
 #include "datasets/error.h"
 
@@ -16,7 +17,6 @@ using Object = nlohmann::json;
 
 constexpr std::size_t kLongestLabel = 64;
 constexpr std::size_t kLongestText = 2000;
-constexpr double kLongestRun_s = 86400;
 
 /// The keys that a command takes beside "command" and "token".
 const std::map<std::string, std::vector<std::string>>& commands() {

@@ -130,6 +130,8 @@ TEST(Sources, NamesAreChecked) {
   using test::message_of;
   EXPECT_NE(message_of([] { open_source("usbx"); }).find("is no source"), std::string::npos);
   EXPECT_NE(message_of([] { open_source("tcp:nowhere"); }).find("write tcp:HOST:PORT"), std::string::npos);
+  EXPECT_NE(message_of([] { open_source("tcp:127.0.0.1:99999"); }).find("port 99999: must be"),
+            std::string::npos);
   EXPECT_NE(message_of([] { open_source("tcp:127.0.0.1:1"); }).find("cannot be opened: Connection refused"),
             std::string::npos);
   EXPECT_NE(message_of([] { open_source("serial:/dev/none"); }).find("No such file"), std::string::npos);

@@ -106,6 +106,11 @@ TEST(Campaign, NamesFileLineAndKey) {
   EXPECT_THAT(refuse(head), HasSubstr("the table [rig] is required"));
   EXPECT_THAT(refuse(head + "[rig]\nnominal_speed_rpm = 5000\npropeller_radius_m = 152.4\n"),
               HasSubstr("campaign.toml:4: rig.propeller_radius_m = 152.4: must lie between 0.005 and 5 m"));
+  const std::string rig = head + "[rig]\nnominal_speed_rpm = 5000\npropeller_radius_m = 0.1524\n";
+  EXPECT_THAT(refuse(rig + "rotors = 3.5\n"),
+              HasSubstr("campaign.toml:5: rig.rotors = 3.5: must be a whole number"));
+  EXPECT_THAT(refuse(rig + "[daq]\nadc_bits = 12.5\n"),
+              HasSubstr("campaign.toml:6: daq.adc_bits = 12.5: must be a whole number"));
   EXPECT_THAT(refuse(head + "[rig]\npropeller_radius_m = 0.1524\n"),
               HasSubstr("rig.nominal_speed_rpm [rev/min] is required"));
   EXPECT_THAT(refuse(head + "[rig\n"), HasSubstr("campaign.toml:2:"));

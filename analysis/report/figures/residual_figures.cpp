@@ -1,5 +1,6 @@
 // What the model in force gained: every run before and after, and the error on blocks held out.
 #include "analysis/report/figures/figures.h"
+#include "datasets/locations.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,19 +17,19 @@ constexpr const char* kResidualFigure = "residual_before_after";
 std::vector<std::vector<double>> residuals_percent(const CampaignData& data, const Reduction& reduction) {
   std::map<std::string, std::pair<double, int>> sums;
   for (const RunCoefficients& run : reduction.runs) {
-    auto& [sum, runs] = sums[data.runs[run.run].location];
+    auto& [sum, runs] = sums[canonical_location(data.runs[run.run].location)];
     sum += run.c_t;
     ++runs;
   }
   std::vector<const RunCoefficients*> in_order;
   for (const RunCoefficients& run : reduction.runs)
-    if (sums[data.runs[run.run].location].second > 1) in_order.push_back(&run);
+    if (sums[canonical_location(data.runs[run.run].location)].second > 1) in_order.push_back(&run);
   std::stable_sort(in_order.begin(), in_order.end(), [&](const auto* a, const auto* b) {
     return data.runs[a->run].start_s < data.runs[b->run].start_s;
   });
   std::vector<std::vector<double>> rows;
   for (const RunCoefficients* run : in_order) {
-    const auto& [sum, runs] = sums[data.runs[run->run].location];
+    const auto& [sum, runs] = sums[canonical_location(data.runs[run->run].location)];
     rows.push_back({static_cast<double>(rows.size() + 1), 100 * (run->c_t * runs / sum - 1)});
   }
   return rows;

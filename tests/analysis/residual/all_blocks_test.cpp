@@ -46,7 +46,7 @@ TEST_F(AllBlocks, WhatTheyAloneShowIsUnknownAndNotScored) {
     ++of_all;
     EXPECT_EQ(e.by_sealed_too.size(), e.unknown.size());
     EXPECT_TRUE(e.model.curves.empty());
-    EXPECT_NEAR(e.unknown[0].amplitude, 0.0013 * 7, 0.6 * 0.0022 * 7);
+    EXPECT_NEAR(e.unknown[0].amplitude, 0.0013 * 7, 0.6 * 0.0013 * 7);
     EXPECT_EQ(e.after.held_out_rmse, e.before.held_out_rmse);
     EXPECT_THAT(explanation_text(e), HasSubstr("only with the sealed blocks in"));
     EXPECT_TRUE(e.unknown[0].could_be.empty()) << "no effect of the library goes with it";

@@ -109,6 +109,25 @@ TEST_F(CampaignMeaning, ADriftOfTheZeroIsHeldAgainstTheTemperatureOfTheTares) {
   }
 }
 
+TEST_F(CampaignMeaning, OneLocationHasOneCoefficientHoweverItIsWritten) {
+  add_sessions(Tares::kNone, 0);
+  int centre = 0;
+  for (tunnelrig::Run& run : data.runs)
+    if (run.location == "OT" && ++centre % 2 == 0) run.location = "H0V0";
+  EXPECT_EQ(observe_campaign(data, {}).groups(), 3);
+}
+
+/// What changes within a run goes by the clock, whichever frames were lost.
+TEST_F(CampaignMeaning, LostFramesAreAPartOfARunsTime) {
+  add_sessions(Tares::kNone, 0);
+  RunStatistics& lossy = data.statistics.at(data.runs[3].run);
+  lossy.window_s = 0.25;
+  lossy.window_means_V.assign(lossy.channels.size() * 9, 1);  // the ninth begins after two seconds
+  const Observations o = observe_campaign(data, {});
+  EXPECT_NEAR(o.duration_s(2), 1, 0.01);
+  EXPECT_NEAR(o.duration_s(3), 2, 1e-12);
+}
+
 TEST_F(CampaignMeaning, AnAdoptedDriftIsTakenOffByTheTaresTemperature) {
   add_sessions(Tares::kBothEnds, 0.004);
   const Observations o = observe_campaign(data, {});

@@ -143,6 +143,38 @@ TEST_P(HeldOut, ExpectedScatterCoversTheErrors) {
   EXPECT_NEAR(inside / count, 0.95, 0.015);
 }
 
+/// A held-out group's constant comes from every other run of it: what neighbours share is in it already.
+TEST_P(HeldOut, ExpectedScatterOfAGroupsOwnBaselineKnowsItsNeighbours) {
+  std::mt19937_64 random(test::seed() + 8);
+  double squares = 0, count = 0;
+  std::vector<double> of_table;
+  for (int i = 0; i < 300; ++i) {
+    Observations o = test::simulate({.runs_of_block = std::vector<int>(9, 8),
+                                     .groups = 1,
+                                     .channels = GetParam(),
+                                     .session_ratio = 0,
+                                     .run_correlation = 0.8},
+                                    random);
+    o.group = o.block;
+    o.group_name = o.block_name;
+    o.groups_within_blocks = true;
+    o.scatter.run_correlation = {0.8, 0.8};
+    const Split split = split_blocks(o);
+    const HeldOutErrors errors =
+        predict_held_out(o, {o.y}, {}, known_variances(o, 0.002, 0), split.fit, split.test);
+    double of_this = 0;
+    for (Index k = 0; k < errors.error.size(); ++k)
+      if (const double error = errors.error.data()[k]; !std::isnan(error))
+        of_this += std::pow(error / errors.expected_std.data()[k], 2);
+    of_table.push_back(of_this / static_cast<double>(errors.count()));
+    squares += of_table.back();
+    count += 1;
+  }
+  double spread = 0;
+  for (const double value : of_table) spread += std::pow(value - squares / count, 2);
+  EXPECT_NEAR(squares / count, 1, 4 * std::sqrt(spread) / count);
+}
+
 TEST_P(HeldOut, GroupsThatOnlyTheHeldOutPartHasAreNotScored) {
   std::mt19937_64 random(test::seed() + 3);
   Observations o = test::simulate({.channels = GetParam()}, random);

@@ -143,6 +143,28 @@ TEST_F(JointFitTest, LargeEffectsAreOfTheirSize) {
   EXPECT_NEAR(fit.variances.sigma[0], 2e-4, 5e-5);
 }
 
+/// What stands beside a coefficient at theory is found with it there, though the data alone, in which the two
+/// go together, would have both elsewhere.
+TEST_F(JointFitTest, ParametersAreThoseBesideTheory) {
+  Observations o = observations(1, 0, 2e-3);
+  test::add_covariate(o, "air_pressure_Pa", 98000, 103000, random);
+  test::add_covariate(o, "supply_voltage_V", 14, 16, random);
+  MatrixXd& supply = o.covariates.back().value;
+  supply = 15 + (o.find("air_pressure_Pa")->value.array() - 100500) / 2500 + 0.3 * (supply.array() - 15);
+  test::add_effect(o, "air_pressure", {1});
+  test::add_effect(o, "supply_voltage", {0.2});
+  MeanModel both{{term("air_pressure", {1}), term("supply_voltage", {0.2})}, {}};
+  both.terms[0].at_theory = true;
+  const JointFit fit = fit_jointly(o, both, o.all_rows());
+  const auto beside = estimate_parameters(o, fit, o.all_rows());
+  EXPECT_NEAR(beside[1][0].value, fit.model.terms[1].parameters[0], 1e-5);
+  EXPECT_EQ(beside[0][0].value, 1);
+  EXPECT_LT(beside[0][0].low, beside[0][0].high);
+  both.terms[0].at_theory = false;
+  const auto free = estimate_parameters(o, fit_jointly(o, both, o.all_rows()), o.all_rows());
+  EXPECT_GT(free[1][0].standard_error, 1.5 * beside[1][0].standard_error);
+}
+
 /// Nor is the line that it bends.
 TEST_F(JointFitTest, ALineAndWhatBendsItAreFoundTogether) {
   Observations o = test::simulate({.runs_of_block = std::vector<int>(14, 8),
