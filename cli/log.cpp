@@ -133,8 +133,10 @@ void add_log(CLI::App& app, Work& work) {
   verb->add_option("--humidity", options->humidity, "Relative humidity, 0 to 1");
   verb->add_option("--supply-V", options->supply_V, "Supply voltage");
   verb->add_option("--motor-s", options->motor_s, "Seconds since the motors started");
-  verb->add_option("--capture", options->capture,
-                   "Write the received bytes of all runs to this file too (for --source replay:FILE)");
+  verb->add_option(
+      "--capture", options->capture,
+      "Write the received bytes of all runs to this file too (--source replay:FILE plays back the "
+      "first)");
   verb->add_option("--speed", options->pace, "Virtual rig: times real time, or max")->capture_default_str();
   verb->add_option("--seed", options->seed, "Virtual rig: of everything it does")->capture_default_str();
   verb->add_option("--live", options->live_port,

@@ -156,6 +156,7 @@ class Watchdog {
     if (!started_ || frames != frames_) {
       started_ = true;
       silent_ = false;
+      patience_ = 1;
       frames_ = frames;
       since_s_ = time_s;
       next_alarm_s_ = time_s + silence_s;
@@ -163,14 +164,18 @@ class Watchdog {
     }
     if (time_s - since_s_ >= give_up_s_) return Verdict::kGiveUp;
     if (time_s < next_alarm_s_) return Verdict::kFine;
-    next_alarm_s_ = time_s + silence_s;
+    patience_ = std::min(2 * patience_, kMostPatience);
+    next_alarm_s_ = time_s + patience_ * silence_s;
     return std::exchange(silent_, true) ? Verdict::kStillSilent : Verdict::kBecameSilent;
   }
 
   bool silent() const { return silent_; }
 
  private:
-  double silence_s_, give_up_s_;
+  // A board that starts anew when it is opened must come to its first packet before it is opened again.
+  static constexpr double kMostPatience = 4;
+
+  double silence_s_, give_up_s_, patience_ = 1;
   bool started_ = false, silent_ = false;
   std::uint64_t frames_ = 0;
   double since_s_ = 0, next_alarm_s_ = 0;

@@ -294,6 +294,7 @@ Testability testability(const Effect& effect, const Observations& observations) 
     if (const auto why = observations.not_usable.find(name); why != observations.not_usable.end())
       result.reason = name + " is " + why->second;
     if (!covariate->labels.empty()) result.reason = name + " is a column of texts";
+    if (covariate->derived && covariate->value.isZero(0)) result.reason = name + " is 0 in every run";
   }
   // With the standard's air nothing changes, and a gradient is the drift of zero by another name.
   if ((effect.name == "air_temperature" || effect.name == "temperature_gradient") &&

@@ -115,6 +115,37 @@ TEST(Logger, ASlowBoardIsNotASilentOne) {
   EXPECT_LE(outcome.ledger.silences, 1u);
 }
 
+/// A board that starts anew whenever it is opened, and takes its time.
+class StartingBoard : public PacketSource {
+ public:
+  ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds) override {
+    time_s_ += 0.05;
+    if (time_s_ - opened_s_ < 2.5) return {ReadResult::Status::kNothing, 0, time_s_};
+    const auto bytes = test::packet_bytes({.first = next_});
+    std::copy(bytes.begin(), bytes.end(), buffer.begin());
+    next_ += 16;
+    return {ReadResult::Status::kData, bytes.size(), time_s_};
+  }
+  bool reopen() override {
+    opened_s_ = time_s_;
+    return true;
+  }
+  std::string name() const override { return "starting"; }
+
+ private:
+  std::uint64_t next_ = 0;
+  double time_s_ = 0, opened_s_ = 0;
+};
+
+TEST(Logger, ABoardIsLeftTheTimeToStart) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  StartingBoard board;
+  const LogOutcome outcome = log_run(board, file, test::cells("R1"), {.duration_s = 160 / kRate_hz},
+                                     test::summarizer(), {}, test::never_stop());
+  EXPECT_EQ(outcome.state, RunState::kComplete) << outcome.ledger.end_reason;
+}
+
 TEST(Logger, ARunEndsWhereTheRateChanges) {
   const test::TemporaryFolder folder;
   CampaignFile file = test::new_campaign(folder / "c.db");
