@@ -34,7 +34,10 @@ Element element_of(SampleType type) {
 
 ThrustLine thrust_line(const CampaignData& data, const Tares& tares, const RawRun& raw, const Run* run) {
   const Certificate& certificate = *data.certificate;
-  const double middle_s = 0.5 * static_cast<double>(raw.frames) / data.info.daq.sample_rate_hz;
+  const auto statistics = data.statistics.find(raw.run);
+  const double middle_s = statistics == data.statistics.end()
+                              ? 0
+                              : 0.5 * statistics->second.elapsed_s(data.info.daq.sample_rate_hz);
   const auto tare = run != nullptr ? tares.zero_at(run->session, run->start_s + middle_s) : std::nullopt;
   const double volts = is_counts(raw.format.type) ? data.info.daq.volts_per_count() : 1;
   ThrustLine line;

@@ -129,8 +129,8 @@ class Evaluation {
   }
 
   /// log(F'/F) where the model is multiplicative, F' − F where it is not: F' the run's mean, as measured.
-  EffectJet change(const EffectJet& changed, double force) const {
-    return observations_.multiplicative ? log_of_share(changed / force) : changed - force;
+  EffectJet change(const EffectJet& mean, double force) const {
+    return observations_.multiplicative ? log_of_share(mean / force) : mean - force;
   }
 
   /// A course is measured over the run's own mean.

@@ -43,9 +43,10 @@ void expect_finite(const json& value, const std::string& path) {
 /// Field names are a contract.
 void expect_contract(const Explanation& explanation) {
   const json written = json::parse(explanation_json(explanation));
-  for (const char* key : {"format", "campaign", "response", "unit", "baseline", "verdict", "noise_floor",
-                          "blocks", "runs", "before", "after", "adopted", "unknown", "untestable",
-                          "suspect_rows", "detectable_at_80_percent_power", "empirical"})
+  for (const char* key :
+       {"format", "campaign", "response", "unit", "baseline", "verdict", "noise_floor", "blocks", "runs",
+        "before", "after", "adopted", "unknown", "untestable", "suspect_rows",
+        "detectable_at_80_percent_power", "detectable_by_effect", "empirical", "warnings"})
     EXPECT_TRUE(written.contains(key)) << key;
   EXPECT_EQ(written["format"], "tunnelrig-explain/1");
   for (const char* when : {"before", "after"}) {
@@ -55,8 +56,8 @@ void expect_contract(const Explanation& explanation) {
     EXPECT_LE(written[when]["held_out_ci95"][0], written[when]["held_out_ci95"][1]);
   }
   for (const json& adopted : written["adopted"]) {
-    for (const char* key :
-         {"effect", "rotor", "parameters", "p_value", "held_out_gain", "confounded_with", "separating_run"})
+    for (const char* key : {"effect", "form", "rotor", "parameters", "p_value", "held_out_gain",
+                            "confounded_with", "separating_run"})
       EXPECT_TRUE(adopted.contains(key)) << key;
     for (const json& parameter : adopted["parameters"]) {
       EXPECT_TRUE(parameter["value"].is_number());
