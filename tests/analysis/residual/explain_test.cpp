@@ -66,7 +66,8 @@ void expect_contract(const Explanation& explanation) {
     }
   }
   for (const json& unknown : written["unknown"]) {
-    for (const char* key : {"covariate", "rotor", "p_value", "amplitude", "shape", "labels", "instead_of"})
+    for (const char* key : {"covariate", "covariate_unit", "place", "times", "rotor", "p_value", "amplitude",
+                            "shape", "labels", "instead_of", "by_sealed_too", "could_be"})
       EXPECT_TRUE(unknown.contains(key)) << key;
     for (const json& point : unknown["shape"]) EXPECT_EQ(point.size(), 4u);
   }
@@ -78,6 +79,7 @@ void expect_contract(const Explanation& explanation) {
   for (const json& row : written["suspect_rows"]) {
     EXPECT_TRUE(row.contains("row"));
     EXPECT_TRUE(row.contains("studentised"));
+    EXPECT_TRUE(row.contains("set_aside"));
   }
   EXPECT_GT(written["noise_floor"], 0);
   expect_finite(written, "");
