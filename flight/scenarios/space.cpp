@@ -22,26 +22,30 @@ bool differ(double a, double b) { return std::abs(a - b) > 0.01 * b; }
 
 FlightSpace::FlightSpace(FlightTunnel shape, const Airframe& frame)
     : tunnel(std::move(shape)),
-      walls(corners_above(tunnel.section, tunnel.section.lowest().y())),
-      floor_m(tunnel.section.lowest().y()),
-      middle_y_m_(0.5 * (tunnel.section.lowest().x() + tunnel.section.highest().x())),
-      middle_z_m_(0.5 * (tunnel.section.lowest().y() + tunnel.section.highest().y())) {
-  if (frame.width_m >= tunnel.section.width_m())
+      walls(corners_above(tunnel.section, tunnel.box().lowest.y())),
+      floor_m(tunnel.box().lowest.y()) {
+  const SectionBox box = tunnel.box();
+  if (frame.width_m >= box.width_m())
     throw InputError::in("tunnel " + tunnel.name,
-                         "{:g} m wide, and the vehicle is {:g} m wide from tip to tip",
-                         tunnel.section.width_m(), frame.width_m);
-  if (frame.height_m >= tunnel.section.height_m())
+                         "{:g} m wide, and the vehicle is {:g} m wide from tip to tip", box.width_m(),
+                         frame.width_m);
+  if (frame.height_m >= box.height_m())
     throw InputError::in("tunnel " + tunnel.name, "{:g} m high, and the vehicle is {:g} m high",
-                         tunnel.section.height_m(), frame.height_m);
+                         box.height_m(), frame.height_m);
+}
+
+Plane FlightSpace::middle_m() const {
+  const SectionPoint middle = tunnel.box().middle();
+  return {middle.x(), middle.y() - floor_m};
 }
 
 SectionScale FlightSpace::scale(const Airframe& frame) const {
-  return {middle_m()[0], middle_m()[1], 0.5 * (tunnel.section.width_m() - frame.width_m),
-          0.5 * (tunnel.section.height_m() - frame.height_m)};
+  return {middle_m()[0], middle_m()[1], 0.5 * (tunnel.box().width_m() - frame.width_m),
+          0.5 * (tunnel.box().height_m() - frame.height_m)};
 }
 
 std::string extrapolation(const MapGeometry& map, const FlightSpace& space, const Airframe& frame) {
-  const CrossSection& section = space.tunnel.section;
+  const SectionBox section = space.tunnel.box();
   std::string text;
   if (differ(section.width_m(), map.tunnel_width_m) || differ(section.height_m(), map.tunnel_height_m)) {
     text = fmt::format("the map is of a tunnel of {:g} x {:g} m, this one is {:g} x {:g} m",

@@ -14,19 +14,18 @@ namespace tunnelrig {
 struct FlightSpace {
   FlightTunnel tunnel;
   Walls walls;
-  double floor_m = 0;  // of the lower edge in the cross-section's own frame; z_flight = z_section − floor_m
+  // Of the lower edge, small features aside, in the cross-section's own frame: z_flight = z_section −
+  // floor_m.
+  double floor_m = 0;
 
   /// Throws InputError where the vehicle is as wide as the tunnel or wider, or as high.
   FlightSpace(FlightTunnel shape, const Airframe& frame);
 
-  /// (4.1), (4.2) for this tunnel's bounding box.
+  /// (4.1), (4.2) for this tunnel's bounding box without small features.
   SectionScale scale(const Airframe& frame) const;
 
-  /// Middle of the bounding box.
-  Plane middle_m() const { return {middle_y_m_, -floor_m + middle_z_m_}; }
-
- private:
-  double middle_y_m_, middle_z_m_;
+  /// Middle of that box.
+  Plane middle_m() const;
 };
 
 /// What differs, in words, where a map was made in another tunnel or with another vehicle by more than one

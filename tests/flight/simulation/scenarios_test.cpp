@@ -38,6 +38,21 @@ TEST_F(Scenarios, OfTheThesisFitEveryTunnelOfTheThesis) {
   }
 }
 
+/// A bay, and a pit in the floor, change neither heights nor where the map is.
+TEST_F(Scenarios, SmallFeaturesMakeNoOtherTunnel) {
+  const std::string square = "name = \"t\"\nlength_m = 10\nshape = \"square\"\nwidth_m = 1.6\n";
+  const FlightSpace plain(parse_tunnel(square, "t.toml"), frame);
+  const SectionScale expected = plain.scale(frame);
+  for (const char* feature : {"edge = 1\nfrom_m = 0.5\nto_m = 0.8\ninward_m = -0.5\n",
+                              "edge = 0\nfrom_m = 0.5\nto_m = 0.8\ninward_m = -0.3\n"}) {
+    const FlightSpace there(parse_tunnel(square + "[[feature]]\n" + feature, "t.toml"), frame);
+    EXPECT_DOUBLE_EQ(there.floor_m, plain.floor_m);
+    const SectionScale scale = there.scale(frame);
+    EXPECT_DOUBLE_EQ(scale.y_norm(0.2), expected.y_norm(0.2));
+    EXPECT_DOUBLE_EQ(scale.z_norm(1), expected.z_norm(1));
+  }
+}
+
 TEST_F(Scenarios, FitLowAndTallTunnelsTooWithoutAJump) {
   const test::TemporaryFolder folder;
   for (const double height_m : {1.2, 1.5, 60.0}) {
