@@ -279,13 +279,10 @@ int Logging::report(const std::string& name, const PlannedRun& planned, const Lo
                      ledger.frames_test_pattern));
     problem = true;
   }
-  if (ledger.frames_adc_error > 0) {
-    warn(fmt::format("run {}: the board flags {} frames as errors of the converter", name,
-                     ledger.frames_adc_error));
-    problem = true;
-  }
-  if (ledger.frames_clipped > 0) {
-    warn(fmt::format("run {}: the board flags {} frames as clipped", name, ledger.frames_clipped));
+  for (const auto& [frames, what] :
+       {std::pair(ledger.frames_adc_error, "errors of the converter"), {ledger.frames_clipped, "clipped"}}) {
+    if (frames == 0) continue;
+    warn(fmt::format("run {}: the board flags {} frames as {}", name, frames, what));
     problem = true;
   }
   if (ledger.board_rate_hz && std::abs(*ledger.board_rate_hz / info_.daq.sample_rate_hz - 1) > 1e-3) {

@@ -199,8 +199,7 @@ std::unique_ptr<PacketSource> open_tcp(const std::string& name, std::string_view
   const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), number);
   if (error != std::errc() || end != port.data() + port.size() || number < 1 || number > 65535)
     throw InputError::in(name, "port {}: must be a number from 1 to 65535", port);
-  auto source = std::make_unique<TcpSource>(name, std::string(address.substr(0, colon)),
-                                            std::string(address.substr(colon + 1)));
+  auto source = std::make_unique<TcpSource>(name, std::string(address.substr(0, colon)), std::string(port));
   source->open_or_throw();
   return source;
 }

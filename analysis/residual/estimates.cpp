@@ -109,23 +109,12 @@ struct Jackknife {
   }
 };
 
-using Folds = std::vector<std::vector<int>>;  // of each the rows that are kept
-
-Folds leave_out_blocks(const Observations& observations, const std::vector<int>& rows) {
-  const std::map<int, std::size_t> fold_of = folds_of_blocks(observations, rows);
-  Folds folds(std::min(fold_of.size(), kMostFolds));
-  for (std::size_t fold = 0; fold < folds.size(); ++fold)
-    for (const int row : rows)
-      if (fold_of.at(observations.block[static_cast<std::size_t>(row)]) != fold) folds[fold].push_back(row);
-  return folds;
-}
-
 Jackknife jackknife(const Observations& observations, const MeanModel& model, const NullFit& variances,
-                    const std::vector<int>& rows, const Folds& folds) {
+                    const std::vector<int>& rows, const std::vector<Fold>& folds) {
   Jackknife result{refit(observations, model, variances, rows), {}};
   for (const Term& term : model.terms) result.values.emplace_back(term.parameters.size());
-  for (const std::vector<int>& kept : folds) {
-    const MeanModel without = refit(observations, result.centre, variances, kept);
+  for (const Fold& fold : folds) {
+    const MeanModel without = refit(observations, result.centre, variances, fold.kept);
     for (std::size_t t = 0; t < without.terms.size(); ++t)
       for (std::size_t k = 0; k < without.terms[t].parameters.size(); ++k)
         result.values[t][k].push_back(without.terms[t].parameters[k]);
@@ -138,7 +127,7 @@ Jackknife jackknife(const Observations& observations, const MeanModel& model, co
 std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observations& observations,
                                                                 const JointFit& fit,
                                                                 const std::vector<int>& rows) {
-  const Folds folds = leave_out_blocks(observations, rows);
+  const std::vector<Fold> folds = leave_out_blocks(observations, rows);
   const double dof = static_cast<double>(folds.size()) - 1;
   const Jackknife found = jackknife(observations, fit.model, fit.variances, rows, folds);
   std::vector<std::vector<ParameterEstimate>> result(fit.model.terms.size());

@@ -86,16 +86,14 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
 
 /// What all runs say against a name that the open ones had let in; empty: nothing. Theory's coefficient is
 /// not the data's to refute.
-std::string refutation(const AdoptedEffect& adopted, const std::string& baseline_over) {
+std::string refutation(const AdoptedEffect& adopted, const Observations& observations) {
   if (adopted.term.effect->theory_only || adopted.term.at_theory) return "";
   const ParameterEstimate& amplitude = adopted.parameters[0];
   if (adopted.at_bound) return fmt::format("its {} is at its physical bound", amplitude.name);
   if (adopted.anywhere) return "when it happened is not known within half of the runs";
   if (adopted.bends_away)
     return fmt::format("what goes with {} bends away from its formula",
-                       adopted.term.effect->covariates.empty()
-                           ? baseline_over  // of the force alone
-                           : fmt::format("{}", fmt::join(adopted.term.effect->covariates, ", ")));
+                       fmt::join(own_conditions(*adopted.term.effect, observations), ", "));
   const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
   // Where groups have their own, these may be of either sign, and nothing on the whole.
   const bool nothing =
@@ -128,12 +126,12 @@ bool baseline_does_better(const Explanation& explanation) {
          explanation.sealed.against_adopted;
 }
 
-Refuted refuted(const Explanation& explanation, const std::string& baseline_over) {
+Refuted refuted(const Explanation& explanation, const Observations& observations) {
   Refuted result;
   bool refutable = false;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     refutable = refutable || !adopted.term.effect->theory_only;
-    const std::string why = refutation(adopted, baseline_over);
+    const std::string why = refutation(adopted, observations);
     if (why.empty()) continue;
     result.terms.push_back(adopted.term);
     result.why.push_back(why);
@@ -162,8 +160,8 @@ std::string taken_back_all(const Explanation& explanation) {
 Explanation without_refuted(Explanation explanation, const Observations& observations,
                             std::vector<const Effect*>& effects, SearchSettings& settings,
                             std::vector<std::string>& said) {
-  const std::string& over = observations.baseline_over;
-  for (Refuted found = refuted(explanation, over); found.any(); found = refuted(explanation, over)) {
+  for (Refuted found = refuted(explanation, observations); found.any();
+       found = refuted(explanation, observations)) {
     std::vector<const Effect*> fewer = effects;
     SearchSettings stricter = settings;
     stricter.taken_back.insert(stricter.taken_back.end(), found.terms.begin(), found.terms.end());

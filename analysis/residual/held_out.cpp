@@ -208,25 +208,26 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
   return result;
 }
 
-std::map<int, std::size_t> folds_of_blocks(const Observations& observations, const std::vector<int>& rows) {
+std::vector<Fold> leave_out_blocks(const Observations& observations, const std::vector<int>& rows) {
   std::map<int, std::size_t> fold_of;
   for (const int row : rows) fold_of.emplace(observations.block[static_cast<std::size_t>(row)], 0);
   std::size_t next = 0;
   for (auto& [block, fold] : fold_of) fold = next++ % kMostFolds;
-  return fold_of;
+  std::vector<Fold> folds(std::min(fold_of.size(), kMostFolds));
+  for (const int row : rows) {
+    const std::size_t own = fold_of.at(observations.block[static_cast<std::size_t>(row)]);
+    for (std::size_t fold = 0; fold < folds.size(); ++fold)
+      (fold == own ? folds[fold].left_out : folds[fold].kept).push_back(row);
+  }
+  return folds;
 }
 
 CrossValidation cross_validate(const Observations& observations, const Components& y,
                                const std::vector<Components>& columns, const NullFit& null,
                                const std::vector<int>& rows) {
-  const std::map<int, std::size_t> fold_of = folds_of_blocks(observations, rows);
   CrossValidation result;
-  for (std::size_t fold = 0; fold < std::min(fold_of.size(), kMostFolds); ++fold) {
-    std::vector<int> fit, test;
-    for (const int row : rows)
-      (fold_of.at(observations.block[static_cast<std::size_t>(row)]) == fold ? test : fit).push_back(row);
-    result.folds.push_back(predict_held_out(observations, y, columns, null, fit, test));
-  }
+  for (const Fold& fold : leave_out_blocks(observations, rows))
+    result.folds.push_back(predict_held_out(observations, y, columns, null, fold.kept, fold.left_out));
   return result;
 }
 

@@ -4,7 +4,6 @@
 #include "analysis/residual/likelihood.h"
 
 #include <cstddef>
-#include <map>
 #include <vector>
 
 namespace tunnelrig {
@@ -43,7 +42,10 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
 
 /// Blocks left out at a time, one each; of more blocks than this they are dealt out.
 inline constexpr std::size_t kMostFolds = 24;
-std::map<int, std::size_t> folds_of_blocks(const Observations& observations, const std::vector<int>& rows);
+struct Fold {
+  std::vector<int> kept, left_out;  // rows
+};
+std::vector<Fold> leave_out_blocks(const Observations& observations, const std::vector<int>& rows);
 
 /// Leave-one-block-out over the blocks of `rows`.
 struct CrossValidation {

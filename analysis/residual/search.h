@@ -179,9 +179,6 @@ class Search {
   void drop(std::size_t t, const JointFit& without);
   /// The same, and gives the newest curve the straight part that no name takes any more.
   void give_way_to_curve(std::size_t t, const JointFit& without);
-  /// What an effect goes by: its covariates; with `power:COLUMN` that column for a function of the force
-  /// alone, because a bend there is as likely the law's as the cell's.
-  std::vector<std::string> conditions_of(const Effect& effect) const;
   /// Of what an effect makes of its conditions, `made` per unit of its amplitude on top of `predicted`, the
   /// share that does not go with what the curve is over.
   double share_beside(const Curve& curve, const Term& term, const Eigen::MatrixXd& made,

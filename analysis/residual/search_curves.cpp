@@ -154,13 +154,6 @@ void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
   read_back_terms();
 }
 
-std::vector<std::string> Search::conditions_of(const Effect& effect) const {
-  const bool of_force_alone = effect.covariates.empty() && effect.scope != EffectScope::kPair &&
-                              !effect.needs_previous && !effect.has_change_point();
-  if (!of_force_alone || observations_.baseline_over.empty()) return effect.covariates;
-  return {observations_.baseline_over};
-}
-
 double Search::share_beside(const Curve& curve, const Term& term, const Eigen::MatrixXd& made,
                             const Eigen::MatrixXd& predicted) const {
   const Eigen::Index channel = std::max(term.rotor, 0), of_curve = curve.x.cols() > 1 ? channel : 0;
@@ -177,7 +170,7 @@ double Search::share_beside(const Curve& curve, const Term& term, const Eigen::M
 bool Search::is_work_of_a_curve(const Term& term, const Eigen::MatrixXd& made,
                                 const Eigen::MatrixXd& predicted) const {
   constexpr double kLittle = 0.1;  // of its variance, over a condition of its own
-  const auto names = conditions_of(*term.effect);
+  const auto names = own_conditions(*term.effect, observations_);
   return !term.per_group &&
          std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
            return is_whole_curve_of(found.curve, term) &&
@@ -193,7 +186,8 @@ bool Search::is_whole_curve_of(const Curve& curve, const Term& term) {
 
 bool Search::outshone_by_curve(const Term& term) const {
   const Curve& curve = result_.curves.back().curve;
-  const bool over_its_own = !curve.tilt.empty() && is_over(curve, conditions_of(*term.effect));
+  const bool over_its_own =
+      !curve.tilt.empty() && is_over(curve, own_conditions(*term.effect, observations_));
   if (!over_its_own && !is_whole_curve_of(curve, term)) return false;
   const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
   const Eigen::MatrixXd made = respond(term, observations_, predicted).value[0];
@@ -219,7 +213,8 @@ bool Search::bends_away(std::size_t t) {
   if (term.per_group || term.effect->theory_only) return false;
   CurveScan bends;
   for (const Curve& curve : curves_) {
-    if (!is_bend_over(curve, conditions_of(*term.effect), term.rotor) || is_described(curve)) continue;
+    if (!is_bend_over(curve, own_conditions(*term.effect, observations_), term.rotor) || is_described(curve))
+      continue;
     Curve bend = without_trend(curve, rows_);
     if (!mixed_->sees(bend.columns[0])) continue;
     bends.scan.candidates.push_back(as_candidate(bend));

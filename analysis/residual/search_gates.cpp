@@ -26,10 +26,10 @@ std::optional<std::string> Search::only_bends(const Term& term, const NullFit& v
                                               const CrossValidation& with_term) const {
   for (const Curve& curve : curves_) {
     const auto shares = [&](const Accepted& other) {
-      return is_over(curve, conditions_of(*other.term.effect)) &&
+      return is_over(curve, own_conditions(*other.term.effect, observations_)) &&
              (other.term.rotor < 0 || other.term.rotor == term.rotor);
     };
-    if (!is_bend_over(curve, conditions_of(*term.effect), term.rotor) ||
+    if (!is_bend_over(curve, own_conditions(*term.effect, observations_), term.rotor) ||
         std::none_of(result_.accepted.begin(), result_.accepted.end(), shares))
       continue;
     std::vector<Components> columns = fit_.linear.columns;

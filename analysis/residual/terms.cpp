@@ -342,6 +342,13 @@ Testability testability(const Effect& effect, const Observations& observations) 
   return result;
 }
 
+std::vector<std::string> own_conditions(const Effect& effect, const Observations& observations) {
+  const bool of_force_alone = effect.covariates.empty() && effect.scope != EffectScope::kPair &&
+                              !effect.needs_previous && !effect.has_change_point();
+  if (!of_force_alone || observations.baseline_over.empty()) return effect.covariates;
+  return {observations.baseline_over};
+}
+
 std::vector<Term> known_terms(const Observations& observations) {
   return observations.from_table ? std::vector<Term>() : terms_of_theory(observations);
 }

@@ -49,6 +49,10 @@ struct Testability {
 };
 Testability testability(const Effect& effect, const Observations& observations);
 
+/// What an effect goes by: its covariates; with `linear:COLUMN` or `power:COLUMN` that column for a function
+/// of the force alone, because a bend there is as likely the law's as the cell's.
+std::vector<std::string> own_conditions(const Effect& effect, const Observations& observations);
+
 /// What is known whatever the data say: of a campaign whose speeds were measured, that thrust goes with their
 /// square.
 std::vector<Term> known_terms(const Observations& observations);

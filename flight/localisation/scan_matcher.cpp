@@ -183,14 +183,14 @@ struct ScanMatcher::Work {
 
   void project(const Pose& pose) { kernels.project(beams, narrowed(projection(pose))); }
 
-  SearchBox box(const std::optional<Eigen::Vector2d>& prior) const {
-    SearchBox all{section.lowest(), section.highest()};
+  SectionBox box(const std::optional<Eigen::Vector2d>& prior) const {
+    const SectionBox& all = section.box();
     if (!prior) return all;
     const Eigen::Vector2d gate(settings.prior_gate_m, settings.prior_gate_m);
     return {all.lowest.cwiseMax(*prior - gate), all.highest.cwiseMin(*prior + gate)};
   }
 
-  Found find(const SearchBox& where, double rotation_rad) {
+  Found find(const SectionBox& where, double rotation_rad) {
     project({{0, 0}, rotation_rad, 0});
     return std::visit(
         [&](auto& form) {
@@ -201,7 +201,7 @@ struct ScanMatcher::Work {
   }
 
   /// The rotation whose Hough columns have the sharpest peaks.
-  double best_rotation(const SearchBox& where) {
+  double best_rotation(const SectionBox& where) {
     double best = 0;
     float most = -1;
     const auto steps = static_cast<int>(std::ceil(settings.rotation_search_rad / settings.rotation_step_rad));
@@ -346,7 +346,7 @@ struct ScanMatcher::Work {
   }
 
   /// All maxima of the Hough domain, where the highest is not plainly the right one.
-  Rejection choose(const SearchBox& where, double rotation_rad, Fit& fit) {
+  Rejection choose(const SectionBox& where, double rotation_rad, Fit& fit) {
     std::vector<Fit> good;
     for (const double stretch : stretches()) {
       const Pose view{{0, 0}, rotation_rad, stretch};
@@ -458,7 +458,7 @@ Match ScanMatcher::match(const Scan& scan, const Attitude& attitude,
   Fit fit;
   Rejection reason = Rejection::few_beams;
   if (work.returned >= static_cast<int>(work.settings.least_beams)) {
-    const SearchBox where = work.box(prior);
+    const SectionBox where = work.box(prior);
     const double rotation = work.settings.unknowns == Unknowns::position ? 0 : work.best_rotation(where);
     const Found found = work.find(where, rotation);
     fit = work.refine({found.best.position, rotation, 0});

@@ -53,7 +53,7 @@ void TwoColumnSearch::take(const BeamKernels& kernels, const Beams& beams) {
   z_.correlate(kernels, beams);
 }
 
-Found TwoColumnSearch::find(const BeamKernels& kernels, const SearchBox& box) const {
+Found TwoColumnSearch::find(const BeamKernels& kernels, const SectionBox& box) const {
   const HoughPeak y = y_.highest(kernels, box.lowest.x(), box.highest.x());
   const HoughPeak z = z_.highest(kernels, box.lowest.y(), box.highest.y());
   const float other_y = rival(y_, kernels, box.lowest.x(), box.highest.x(), y.shift_m);
@@ -65,7 +65,7 @@ Found TwoColumnSearch::find(const BeamKernels& kernels, const SearchBox& box) co
           std::max(share(other_y, y.score), share(other_z, z.score))};
 }
 
-std::vector<Start> TwoColumnSearch::candidates(const BeamKernels& kernels, const SearchBox& box) const {
+std::vector<Start> TwoColumnSearch::candidates(const BeamKernels& kernels, const SectionBox& box) const {
   std::vector<Start> all;
   for (const HoughPeak& y : y_.peaks(kernels, box.lowest.x(), box.highest.x(), kApart_m, kMost_peaks))
     for (const HoughPeak& z : z_.peaks(kernels, box.lowest.y(), box.highest.y(), kApart_m, kMost_peaks))
@@ -87,7 +87,7 @@ void AllDirectionSearch::take(const BeamKernels& kernels, const Beams& beams) {
   for (HoughColumn& column : columns_) column.correlate(kernels, beams);
 }
 
-std::vector<Start> AllDirectionSearch::grid(const SearchBox& box) const {
+std::vector<Start> AllDirectionSearch::grid(const SectionBox& box) const {
   const Eigen::Vector2d size = box.highest - box.lowest;
   const auto steps_y = static_cast<int>(std::ceil(size.x() / step_m_));
   const auto steps_z = static_cast<int>(std::ceil(size.y() / step_m_));
@@ -104,11 +104,11 @@ std::vector<Start> AllDirectionSearch::grid(const SearchBox& box) const {
 }
 
 std::vector<Start> AllDirectionSearch::candidates(const BeamKernels& /*kernels*/,
-                                                  const SearchBox& box) const {
+                                                  const SectionBox& box) const {
   return apart(grid(box), kMost_peaks * kMost_peaks);
 }
 
-Found AllDirectionSearch::find(const BeamKernels& /*kernels*/, const SearchBox& box) const {
+Found AllDirectionSearch::find(const BeamKernels& /*kernels*/, const SectionBox& box) const {
   return first_of(grid(box));
 }
 
@@ -145,7 +145,7 @@ void CircleSearch::take(const BeamKernels& /*kernels*/, const Beams& beams) {
         for (int dz = -1; dz <= 1; ++dz) smoothed_[index(y, z)] += votes_[index(y + dy, z + dz)];
 }
 
-std::vector<Start> CircleSearch::grid(const SearchBox& box) const {
+std::vector<Start> CircleSearch::grid(const SectionBox& box) const {
   std::vector<Start> all;
   for (int y = 0; y < cells_; ++y)
     for (int z = 0; z < cells_; ++z) {
@@ -156,11 +156,11 @@ std::vector<Start> CircleSearch::grid(const SearchBox& box) const {
   return all;
 }
 
-std::vector<Start> CircleSearch::candidates(const BeamKernels& /*kernels*/, const SearchBox& box) const {
+std::vector<Start> CircleSearch::candidates(const BeamKernels& /*kernels*/, const SectionBox& box) const {
   return apart(grid(box), kMost_peaks * kMost_peaks);
 }
 
-Found CircleSearch::find(const BeamKernels& /*kernels*/, const SearchBox& box) const {
+Found CircleSearch::find(const BeamKernels& /*kernels*/, const SectionBox& box) const {
   return first_of(grid(box));
 }
 

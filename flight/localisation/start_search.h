@@ -20,11 +20,7 @@ struct Found {
   double rivalry = 0;  // height of the second highest maximum (of either column) as a share of the highest
 };
 
-/// Positions that are searched, m.
-struct SearchBox {
-  SectionPoint lowest{0, 0};
-  SectionPoint highest{0, 0};
-};
+// `box`: positions that are searched, m.
 
 /// β = 0° and 90° alone (6.8): y and z are found apart from each other.
 class TwoColumnSearch {
@@ -32,9 +28,9 @@ class TwoColumnSearch {
   TwoColumnSearch(const CrossSection& section, std::span<const SectionPoint> reference,
                   const MatcherSettings& settings);
   void take(const BeamKernels& kernels, const Beams& beams);
-  Found find(const BeamKernels& kernels, const SearchBox& box) const;
+  Found find(const BeamKernels& kernels, const SectionBox& box) const;
   /// The highest maxima that are apart from each other, best first.
-  std::vector<Start> candidates(const BeamKernels& kernels, const SearchBox& box) const;
+  std::vector<Start> candidates(const BeamKernels& kernels, const SectionBox& box) const;
 
  private:
   HoughColumn y_, z_;
@@ -48,11 +44,11 @@ class AllDirectionSearch {
   AllDirectionSearch(const CrossSection& section, std::span<const SectionPoint> reference,
                      const MatcherSettings& settings);
   void take(const BeamKernels& kernels, const Beams& beams);
-  Found find(const BeamKernels& kernels, const SearchBox& box) const;
-  std::vector<Start> candidates(const BeamKernels& kernels, const SearchBox& box) const;
+  Found find(const BeamKernels& kernels, const SectionBox& box) const;
+  std::vector<Start> candidates(const BeamKernels& kernels, const SectionBox& box) const;
 
  private:
-  std::vector<Start> grid(const SearchBox& box) const;
+  std::vector<Start> grid(const SectionBox& box) const;
 
   std::vector<HoughColumn> columns_;
   double step_m_;
@@ -65,14 +61,14 @@ class CircleSearch {
   CircleSearch(const CrossSection& section, std::span<const SectionPoint> reference,
                const MatcherSettings& settings);
   void take(const BeamKernels& kernels, const Beams& beams);
-  Found find(const BeamKernels& kernels, const SearchBox& box) const;
-  std::vector<Start> candidates(const BeamKernels& kernels, const SearchBox& box) const;
+  Found find(const BeamKernels& kernels, const SectionBox& box) const;
+  std::vector<Start> candidates(const BeamKernels& kernels, const SectionBox& box) const;
 
  private:
   std::size_t index(int y, int z) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(cells_) + static_cast<std::size_t>(z);
   }
-  std::vector<Start> grid(const SearchBox& box) const;
+  std::vector<Start> grid(const SectionBox& box) const;
 
   double cell_m_;
   double lowest_m_;

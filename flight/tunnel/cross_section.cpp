@@ -94,12 +94,12 @@ CrossSection::CrossSection(std::vector<SectionPoint> vertices, const std::string
   check_vertices(vertices_, name);
   check_simple(vertices_, name);
   if (signed_area(vertices_) < 0) std::reverse(vertices_.begin(), vertices_.end());
-  lowest_ = highest_ = vertices_.front();
+  box_ = {vertices_.front(), vertices_.front()};
   for (std::size_t i = 0; i < vertices_.size(); ++i) {
     const SectionPoint& start = vertices_[i];
     const SectionPoint along = vertices_[(i + 1) % vertices_.size()] - start;
-    lowest_ = lowest_.cwiseMin(start);
-    highest_ = highest_.cwiseMax(start);
+    box_.lowest = box_.lowest.cwiseMin(start);
+    box_.highest = box_.highest.cwiseMax(start);
     start_y_.push_back(start.x());
     start_z_.push_back(start.y());
     along_y_.push_back(along.x());

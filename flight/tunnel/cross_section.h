@@ -14,6 +14,15 @@ namespace tunnelrig {
 /// section without its small features. A direction or a size in the same axes is one too.
 using SectionPoint = Eigen::Vector2d;
 
+/// A rectangle by its corners, m.
+struct SectionBox {
+  SectionPoint lowest{0, 0}, highest{0, 0};
+
+  double width_m() const { return highest.x() - lowest.x(); }
+  double height_m() const { return highest.y() - lowest.y(); }
+  SectionPoint middle() const { return (lowest + highest) / 2; }
+};
+
 /// Distance to the wall that is nearest to a point.
 struct NearestWall {
   double distance_m = 0;  // always positive
@@ -33,10 +42,11 @@ class CrossSection {
   explicit CrossSection(std::vector<SectionPoint> vertices, const std::string& name = "cross-section");
 
   std::span<const SectionPoint> vertices() const { return vertices_; }
-  SectionPoint lowest() const { return lowest_; }  // corners of the bounding box
-  SectionPoint highest() const { return highest_; }
-  double width_m() const { return highest_.x() - lowest_.x(); }
-  double height_m() const { return highest_.y() - lowest_.y(); }
+  const SectionBox& box() const { return box_; }
+  SectionPoint lowest() const { return box_.lowest; }
+  SectionPoint highest() const { return box_.highest; }
+  double width_m() const { return box_.width_m(); }
+  double height_m() const { return box_.height_m(); }
 
   bool contains(const SectionPoint& point) const;
 
@@ -55,8 +65,7 @@ class CrossSection {
 
  private:
   std::vector<SectionPoint> vertices_;
-  SectionPoint lowest_{0, 0};
-  SectionPoint highest_{0, 0};
+  SectionBox box_;
   // One value per edge each, side by side, so that a ray meets several edges at once.
   std::vector<double> start_y_, start_z_, along_y_, along_z_;
 };

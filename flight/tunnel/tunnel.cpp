@@ -143,10 +143,7 @@ FlightTunnel parse_tunnel(const std::string& toml, const std::string& file) {
                       length(document, "length_m", file),
                       shape == "circle" ? length(document, "diameter_m", file) : 0,
                       {}};
-  if (!small.empty()) {
-    const CrossSection without(plain, file);
-    tunnel.plain_box = SectionBox{without.lowest(), without.highest()};
-  }
+  if (!small.empty()) tunnel.plain_box = CrossSection(plain, file).box();
   return tunnel;
 }
 
@@ -155,15 +152,13 @@ FlightTunnel read_tunnel(const std::filesystem::path& path) {
 }
 
 FlightTunnel tunnel_from(const std::string& name_or_file) {
-  if (name_or_file == "1.5") return {"1.5", CrossSection(box_outline(1.5, 1.5)), 2.5, 0, {}};
-  if (name_or_file == "2.4") return {"2.4", CrossSection(box_outline(2.35, 2.39)), 6.06, 0, {}};
+  if (name_or_file == "1.5") return {"1.5", CrossSection(box_outline(1.5, 1.5)), 2.5};
+  if (name_or_file == "2.4") return {"2.4", CrossSection(box_outline(2.35, 2.39)), 6.06};
   if (name_or_file == "railway")
     return {"railway",
             CrossSection(
                 arch_outline(kRailway_width_m, kRailway_height_m, kRailway_height_m - kRailway_width_m / 2)),
-            kRailway_length_m,
-            0,
-            {}};
+            kRailway_length_m};
   if (!std::filesystem::exists(name_or_file))
     throw InputError::in(name_or_file, "no such tunnel: 1.5, 2.4, railway, or a file");
   return read_tunnel(name_or_file);

@@ -9,15 +9,6 @@
 
 namespace tunnelrig {
 
-/// Corners of a bounding box.
-struct SectionBox {
-  SectionPoint lowest{0, 0}, highest{0, 0};
-
-  double width_m() const { return highest.x() - lowest.x(); }
-  double height_m() const { return highest.y() - lowest.y(); }
-  SectionPoint middle() const { return (lowest + highest) / 2; }
-};
-
 struct FlightTunnel {
   std::string name;
   CrossSection section;
@@ -26,7 +17,7 @@ struct FlightTunnel {
   std::optional<SectionBox> plain_box;  // without small features, where there are such
 
   /// What floor, middle and size go by: a refuge bay makes no tunnel wider.
-  SectionBox box() const { return plain_box.value_or(SectionBox{section.lowest(), section.highest()}); }
+  SectionBox box() const { return plain_box.value_or(section.box()); }
 };
 
 /// "1.5" (1.5 × 1.5 × 2.5 m), "2.4" (2.35 × 2.39 × 6.06 m) and "railway" (4.5 × 5.0 m, half-circular arch) of

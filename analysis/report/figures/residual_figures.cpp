@@ -16,20 +16,23 @@ constexpr const char* kResidualFigure = "residual_before_after";
 /// How far each run's C_T is from the mean of its location, in per cent, in order of time.
 std::vector<std::vector<double>> residuals_percent(const CampaignData& data, const Reduction& reduction) {
   std::map<std::string, std::pair<double, int>> sums;
+  const auto sum_of = [&](const RunCoefficients& run) -> std::pair<double, int>& {
+    return sums[canonical_location(data.runs[run.run].location)];
+  };
   for (const RunCoefficients& run : reduction.runs) {
-    auto& [sum, runs] = sums[canonical_location(data.runs[run.run].location)];
+    auto& [sum, runs] = sum_of(run);
     sum += run.c_t;
     ++runs;
   }
   std::vector<const RunCoefficients*> in_order;
   for (const RunCoefficients& run : reduction.runs)
-    if (sums[canonical_location(data.runs[run.run].location)].second > 1) in_order.push_back(&run);
+    if (sum_of(run).second > 1) in_order.push_back(&run);
   std::stable_sort(in_order.begin(), in_order.end(), [&](const auto* a, const auto* b) {
     return data.runs[a->run].start_s < data.runs[b->run].start_s;
   });
   std::vector<std::vector<double>> rows;
   for (const RunCoefficients* run : in_order) {
-    const auto& [sum, runs] = sums[canonical_location(data.runs[run->run].location)];
+    const auto& [sum, runs] = sum_of(*run);
     rows.push_back({static_cast<double>(rows.size() + 1), 100 * (run->c_t * runs / sum - 1)});
   }
   return rows;
