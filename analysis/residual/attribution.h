@@ -50,6 +50,12 @@ struct Accepted {
   std::vector<Ranked> confounded;  // one way of each effect that does as well
 };
 
+/// A candidate that fitted best by far, with an amplitude that physics does not allow.
+struct BeyondBounds {
+  Term term;
+  double amplitude = 0;  // of its own unit, if nothing held it
+};
+
 struct FoundCurve {
   Curve curve;
   double p = 1;
@@ -60,6 +66,7 @@ struct FoundCurve {
 struct Attribution {
   std::vector<Accepted> accepted;
   std::vector<FoundCurve> curves;
+  std::vector<BeyondBounds> beyond_bounds;
   /// Sessions scatter far more than runs: of which rotor, −1 for what several do.
   std::optional<int> session_unknown = {};
   JointFit baseline, final;   // without and with the accepted terms and curves

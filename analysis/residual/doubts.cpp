@@ -15,6 +15,22 @@ namespace tunnelrig {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+void warn_of_bounds(const Attribution& found, Explanation& explanation) {
+  std::set<std::string> said;  // of each effect once
+  for (const Accepted& accepted : found.accepted) said.insert(accepted.term.effect->name);
+  for (const BeyondBounds& beyond : found.beyond_bounds) {
+    const Effect& effect = *beyond.term.effect;
+    if (!said.insert(effect.name).second) continue;
+    const EffectParameter& amplitude = effect.parameters[0];
+    const std::string unit = amplitude.unit == "1" ? "" : " " + amplitude.unit;
+    explanation.warnings.push_back(fmt::format(
+        "of all candidates {} fitted best by far, with a {} of about {:.3g}{}, and is not named: physical "
+        "bounds "
+        "are {:.3g} to {:.3g}{}; what is found beside it may be its work",
+        beyond.term.label(), amplitude.name, beyond.amplitude, unit, amplitude.lower, amplitude.upper, unit));
+  }
+}
+
 /// What the opened seal and the intervals say against what was adopted.
 void warn_of_doubts(Explanation& explanation) {
   for (const AdoptedEffect& adopted : explanation.adopted) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -19,6 +20,7 @@ constexpr double kKnownPhysicsWeight = 10;  // theory gives the coefficient: a p
 constexpr double kRareWeight = 10;       // stiff blades do not flex, while a Reynolds number all blades have
 constexpr double kTheoryRefused = 0.05;  // p at which the data speak against theory's coefficient
 constexpr double kSwapDecades = 0.7;     // another explains that much better: it takes the place
+constexpr double kClearDecades = 2;      // beyond the one that is accepted: worth a word
 
 double prior_weight(const Term& term, const Observations& observations, std::size_t ways) {
   const Effect& effect = *term.effect;
@@ -139,9 +141,12 @@ std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const 
 
 bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round) {
   std::vector<const Effect*> refused;
+  std::optional<BeyondBounds> beyond;  // of the first, and none about as good is accepted
   const CrossValidation before = unseen(fit_, fit_.variances);
   for (const std::size_t best : scan.order) {
     if (scan.fits[best].evidence < critical_) break;
+    if (beyond && scan.fits[best].evidence < scan.fits[scan.order[0]].evidence - kClearDecades)
+      result_.beyond_bounds.push_back(*std::exchange(beyond, std::nullopt));
     if (scan.others.contains(best)) {
       const std::size_t had = result_.accepted.size();
       if (!accept_together(scan, best, maxima.p(scan.fits[best].evidence))) continue;
@@ -170,6 +175,8 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
     const LossDifference gain = compare(unseen(fit_, fit.variances), after);
     if (const auto reason = why_not(fit, after, gain)) {
       round.outcome += *reason + "; ";
+      if (best == scan.order[0] && at_bound(fit, fit.model.terms.back()))
+        beyond = {scan.ways[i], scan.fits[i].amplitude(0)};
       continue;
     }
     result_.accepted.push_back({.term = fit.model.terms.back(),
@@ -182,6 +189,7 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
     round.outcome += "accepted " + result_.accepted.back().term.label();
     return true;
   }
+  if (beyond) result_.beyond_bounds.push_back(*beyond);
   return false;
 }
 
