@@ -24,9 +24,8 @@ void warn_of_bounds(const Attribution& found, Explanation& explanation) {
     const EffectParameter& amplitude = effect.parameters[0];
     const std::string unit = amplitude.unit == "1" ? "" : " " + amplitude.unit;
     explanation.warnings.push_back(fmt::format(
-        "of all candidates {} fitted best by far, with a {} of about {:.3g}{}, and is not named: physical "
-        "bounds "
-        "are {:.3g} to {:.3g}{}; what is found beside it may be its work",
+        "of all candidates {} fitted best by far, but its {} would be {:.3g}{}, and its physical bounds are "
+        "{:.3g} to {:.3g}{}: it is not named, and what is found beside it may be its work",
         beyond.term.label(), amplitude.name, beyond.amplitude, unit, amplitude.lower, amplitude.upper, unit));
   }
 }

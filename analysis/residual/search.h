@@ -55,6 +55,11 @@ class Search {
   /// And with an amplitude of each group's own.
   Scan scan_effects_and_groups(const JointFit& base) const;
   Scan list_effects(const JointFit& base) const;  // as scan_effects, without fits
+  /// What a fit makes of an effect that its physical bounds do not hold; nothing where it stays within them.
+  std::optional<BeyondBounds> beyond_bounds(Term way, double start) const;
+  /// Whether more of an effect than physics allows was found, and is described by a curve: what is left of it
+  /// on one rotor is no effect of its own.
+  bool was_beyond_bounds(const Term& way) const;
   Candidate candidate_of(const Term& way, const Eigen::MatrixXd& predicted) const;
   void rank(const JointFit& base, Scan& scan) const;
   bool add_best_effect();

@@ -68,7 +68,7 @@ Search::Scan Search::list_effects(const JointFit& base) const {
   Scan scan;
   const Eigen::MatrixXd predicted = predict_response(observations_, base.model, rows_);
   for (const Term& way : ways_) {
-    if (already_in(way, base.model)) continue;
+    if (already_in(way, base.model) || was_beyond_bounds(way)) continue;
     Candidate candidate = candidate_of(way, predicted);
     const Components& column = candidate.columns[0];
     if (is_work_of_a_curve(way, column[0], predicted) || !mixed_->sees(column)) continue;
@@ -76,6 +76,30 @@ Search::Scan Search::list_effects(const JointFit& base) const {
     scan.candidates.push_back(std::move(candidate));
   }
   return scan;
+}
+
+std::optional<BeyondBounds> Search::beyond_bounds(Term way, double start) const {
+  constexpr double kWidths = 10;
+  const EffectParameter& bounded = way.effect->parameters[0];
+  Effect freed = *way.effect;
+  freed.parameters[0].lower -= kWidths * (bounded.upper - bounded.lower);
+  freed.parameters[0].upper += kWidths * (bounded.upper - bounded.lower);
+  MeanModel model = fit_.model;
+  model.terms.push_back(way);
+  model.terms.back().effect = &freed;
+  model.terms.back().parameters[0] = start;
+  const double amplitude = fit_jointly(observations_, model, rows_).model.terms.back().parameters[0];
+  if (!(amplitude < bounded.lower || amplitude > bounded.upper)) return std::nullopt;
+  return BeyondBounds{std::move(way), amplitude};
+}
+
+bool Search::was_beyond_bounds(const Term& way) const {
+  return std::ranges::any_of(result_.beyond_bounds, [&](const BeyondBounds& beyond) {
+    return beyond.term.effect->name == way.effect->name &&
+           std::ranges::any_of(result_.curves, [&](const FoundCurve& found) {
+             return is_over(found.curve, own_conditions(*way.effect, observations_));
+           });
+  });
 }
 
 Candidate Search::candidate_of(const Term& way, const Eigen::MatrixXd& predicted) const {
@@ -176,7 +200,7 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
     if (const auto reason = why_not(fit, after, gain)) {
       round.outcome += *reason + "; ";
       if (best == scan.order[0] && at_bound(fit, fit.model.terms.back()))
-        beyond = {scan.ways[i], scan.fits[i].amplitude(0)};
+        beyond = beyond_bounds(scan.ways[i], scan.fits[i].amplitude(0));
       continue;
     }
     result_.accepted.push_back({.term = fit.model.terms.back(),

@@ -112,6 +112,24 @@ TEST_F(Gates, WhatTakesBackTheSquareOfTheSpeedIsDoubted) {
   EXPECT_THAT(e.warnings, Contains(HasSubstr("readings of speed_rpm that scatter by")));
 }
 
+/// More of it than physics allows is no name, nor is what is left of it on one rotor; how much it would be is
+/// said.
+TEST_F(Gates, WhatLiesBeyondItsBoundsIsSaidWithItsSize) {
+  Observations o = observations();
+  test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
+  test::add_covariate(o, "tunnel_airspeed_m_s", 0, 0.4, random);
+  const double most = test::effect_named("supply_voltage").parameters[0].upper;
+  test::add_effect(o, "supply_voltage", {most + 1});
+  const Explanation e = explained(o);
+  EXPECT_THAT(names(e), testing::IsEmpty());
+  EXPECT_EQ(e.verdict, "unknown");
+  ASSERT_FALSE(e.unknown.empty());
+  EXPECT_EQ(e.unknown[0].covariate, "supply_voltage_V");
+  EXPECT_THAT(e.warnings,
+              Contains(testing::ContainsRegex(fmt::format(
+                  "supply_voltage fitted best by far, but its exponent would be {:.0f}", most + 1))));
+}
+
 TEST_F(Gates, AnEndAtMaxEffectsIsSaid) {
   Observations o = observations();
   test::add_covariate(o, "supply_voltage_V", 15, 16.5, random);
