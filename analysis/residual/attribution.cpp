@@ -30,6 +30,7 @@ Attribution Search::run() {
   add_curves(curves);
   find_confounded();
   smooth_curves();
+  forget_what_has_a_name();
   result_.session_unknown = session_scatter_is_large();
   result_.final = fit_;
   result_.observations = std::move(observations_);

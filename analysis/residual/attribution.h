@@ -60,7 +60,7 @@ struct FoundCurve {
   Curve curve;
   double p = 1;
   std::vector<std::string> instead_of;  // effects that were in, until the curve showed their formulas wrong
-  std::vector<Term> could_be = {};      // of StructureLeft: one way of each effect that does as well
+  std::vector<Term> could_be = {};      // one way of each effect that may do as well, and is not accepted
 };
 
 struct Attribution {

@@ -146,7 +146,8 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
                           .shape = {},
                           .levels = found.curve.shape == CurveShape::kLevels,
                           .labels = found.curve.labels,
-                          .instead_of = found.instead_of};
+                          .instead_of = found.instead_of,
+                          .could_be = found.could_be};
   if (const Covariate* covariate = observations.find(result.condition)) {
     result.covariate_unit = covariate->unit;
     if (covariate->derived) result.covariate = column_behind(covariate->name);

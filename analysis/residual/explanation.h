@@ -74,7 +74,7 @@ struct UnknownStructure {
   std::vector<std::string> labels;      // of a column of texts: x = i + 1 stands for labels[i]
   std::vector<std::string> instead_of;  // effects over this covariate that do not follow it
   bool by_sealed_too = false;           // the open blocks alone do not show it
-  std::vector<Term> could_be;           // names for that, which it is too late to score
+  std::vector<Term> could_be;  // names that go with it so nearly, or come so late, that none is given
 };
 
 struct Untestable {

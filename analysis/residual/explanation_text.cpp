@@ -92,6 +92,9 @@ std::string could_be_in_words(const UnknownStructure& u) {
   for (const Term& term : u.could_be)
     names.push_back(term.effect->name + (term.rotor < 0 ? "" : fmt::format(" of rotor {}", term.rotor + 1)) +
                     (term.at_theory ? " at theory's coefficient" : ""));
+  if (!u.by_sealed_too)
+    return fmt::format("{} may have a part in it: found before it, and not beyond chance beside it",
+                       fmt::join(names, ", or "));
   return fmt::format("{} would do as well, and could not be scored any more: more sessions would tell",
                      fmt::join(names, ", or "));
 }

@@ -322,7 +322,6 @@ void report_structure_left(const StructureLeft& left, const Observations& observ
   for (const FoundCurve& curve : left.curves) {
     explanation.unknown.push_back(describe(observations, left.fit, curve, rows));
     explanation.unknown.back().by_sealed_too = true;
-    explanation.unknown.back().could_be = curve.could_be;
     explanation.by_sealed_too.push_back(curve.curve);
   }
   for (Round round : left.rounds) {

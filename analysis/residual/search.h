@@ -168,6 +168,8 @@ class Search {
   /// Whether an effect is beyond chance among all candidates with the curves in: what was found while their
   /// structure was in the residual may have been a part of it. `without`: the fit without it.
   bool is_still_found(const Term& term, const JointFit& without);
+  /// What gave way to a curve, and then to another name over the same condition, may not be it any more.
+  void forget_what_has_a_name();
   /// Whether the newest curve, over a covariate of this effect or one that tells as much, has more of the
   /// effect's size than its formula may leave: then the effect was only the curve's straight part.
   bool outshone_by_curve(const Term& term) const;

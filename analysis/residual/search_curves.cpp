@@ -127,8 +127,10 @@ void Search::drop_what_a_curve_replaces() {
     const JointFit without = fit_without(t);
     if (outshone_by_curve(term))
       give_way_to_curve(t, without);
-    else if (!product && !is_still_found(term, without))
+    else if (!product && !is_still_found(term, without)) {
+      result_.curves.back().could_be.push_back(term);
       drop(t, without);
+    }
   }
 }
 
@@ -136,6 +138,17 @@ bool Search::is_still_found(const Term& term, const JointFit& without) {
   const Scan scan = scan_effects(without);
   if (scan.order.empty()) return false;
   return maxima_of(without, scan, 4000 + ++salt_).p(evidence_of(scan, term)) <= settings_.alpha;
+}
+
+void Search::forget_what_has_a_name() {
+  const auto has = [&](const Term& term) {
+    const std::vector<std::string> of_term = own_conditions(*term.effect, observations_);
+    return std::ranges::any_of(result_.accepted, [&](const Accepted& accepted) {
+      const std::vector<std::string> own = own_conditions(*accepted.term.effect, observations_);
+      return std::ranges::find_first_of(own, of_term) != own.end();
+    });
+  };
+  for (FoundCurve& found : result_.curves) std::erase_if(found.could_be, has);
 }
 
 void Search::drop(std::size_t t, const JointFit& without) {

@@ -79,7 +79,7 @@ std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& wit
     if (std::any_of(terms.begin(), std::prev(terms.end()),
                     [&](const Term& each) { return at_bound(fit, each); }))
       continue;
-    result.push_back({term, scan.fits[i].evidence, 0, term.parameters[0], 0});
+    result.push_back({terms.back(), scan.fits[i].evidence, 0, terms.back().parameters[0], 0});
   }
   return result;
 }

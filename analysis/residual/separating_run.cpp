@@ -31,13 +31,14 @@ struct Setting {
 
 double median(const VectorXd& values) { return upper_median({values.begin(), values.end()}); }
 
-/// What a laboratory can set, a little beyond what was seen; never below zero where zero is a limit.
+/// What a laboratory can set, a little beyond what was seen: where all was positive no less than half of the
+/// least, since logarithms and powers have no end towards zero.
 std::pair<double, double> reach(const Covariate& covariate) {
   const VectorXd values = covariate.value.col(0);
   if (covariate.name == "speed_rpm") return {kSlowest * median(values), kFastest * median(values)};
   const double low = values.minCoeff(), high = values.maxCoeff(), range = high - low;
   double least = low - kBeyond * range;
-  if (low >= 0) least = std::max(least, 0.0);
+  if (low >= 0) least = std::max(least, low / 2);
   double most = high + kBeyond * range;
   if (covariate.name == "relative_humidity") most = std::min(most, 1.0);
   return {least, most};
@@ -134,13 +135,18 @@ MatrixXd forces_at(const Observations& observations, const MatrixXd& predicted,
 }
 
 /// Difference of the two effects' predictions, every setting against the ordinary run before it, in σ of such
-/// a pair.
+/// a pair; 0 where either turns the sign of a response that has had only one.
 VectorXd distances(const Observations& observations, const Term& first, const Term& second,
                    const JointFit& fit, const std::vector<Setting>& settings,
                    const std::vector<std::size_t>& ordinary, const std::vector<int>& rows) {
   const Observations at = imagined(observations, settings);
-  const MatrixXd forces = forces_at(observations, predict_response(observations, fit.model, rows), settings);
-  MatrixXd difference = respond(first, at, forces).value[0] - respond(second, at, forces).value[0];
+  std::size_t t = 0;
+  while (!fit.model.terms[t].same_way(first)) ++t;
+  const MatrixXd forces =
+      forces_at(observations, predict_forces(observations, fit.model, rows).acted_on[t], settings);
+  const MatrixXd by_first = respond(first, at, forces).value[0],
+                 by_second = respond(second, at, forces).value[0];
+  MatrixXd difference = by_first - by_second;
   const MatrixXd usual = difference(std::vector<Index>(ordinary.begin(), ordinary.end()), Eigen::all);
   difference -= usual;
   const MixedModel mixed = MixedModel::baseline_alone(observations, rows);
@@ -155,6 +161,12 @@ VectorXd distances(const Observations& observations, const Term& first, const Te
     const double variance = 2 * std::max(std::pow(fit.variances.sigma[k], 2), 1e-300);
     squares += by_mode.middleCols(stratum.first_mode, stratum.modes).rowwise().squaredNorm() / variance;
   }
+  const bool one_sign = (observations.value.array() > 0).all() || (observations.value.array() < 0).all();
+  if (one_sign && !observations.multiplicative)
+    for (Index s = 0; s < squares.size(); ++s)
+      if ((forces.row(s).cwiseProduct(forces.row(s) + by_first.row(s)).array() <= 0).any() ||
+          (forces.row(s).cwiseProduct(forces.row(s) + by_second.row(s)).array() <= 0).any())
+        squares(s) = 0;
   return squares.array().sqrt() / scatter;
 }
 

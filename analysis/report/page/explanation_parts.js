@@ -139,7 +139,9 @@ const unknownText = (unknown, unit) => {
       (name) => `${name.effect}${name.rotor ? ` at rotor ${name.rotor}` : ''}${
           name.at_theory ? ' at theory’s coefficient' : ''}`);
   const names = couldBe.length ?
-      ` ${couldBe.join(', or ')} would do as well, and could not be scored any more: more sessions would tell.` :
+      ` ${couldBe.join(', or ')} ${unknown.by_sealed_too ?
+          'would do as well, and could not be scored any more: more sessions would tell' :
+          'may have a part in it: found before it, and not beyond chance beside it'}.` :
       '';
   const where = `${rotor ? ` at rotor ${rotor}` : ''}${placeText(place)}${timesText(times)}`;
   return `Depends on \`${covariate}\`${where}: amplitude ${digits(amplitude)}${
