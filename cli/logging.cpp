@@ -52,9 +52,11 @@ bool warn_of_unusable(const std::string& run, const Ledger& ledger) {
                      ledger.bytes_skipped));
   if (ledger.packets_corrupt > 0)
     warn(
-        fmt::format("run {}: {} packets were refused: a wrong checksum, a number that is not believed, or "
+        fmt::format("run {}: {} refused: a wrong checksum, a number that is not believed, or "
                     "other frames under numbers that had passed",
-                    run, ledger.packets_corrupt));
+                    run,
+                    ledger.packets_corrupt == 1 ? "1 packet was"
+                                                : fmt::format("{} packets were", ledger.packets_corrupt)));
   if (much_came_again(ledger))
     warn(
         fmt::format("run {}: {} frames came under numbers that had passed and were dropped; a board that "

@@ -16,6 +16,7 @@
 #include <future>
 #include <map>
 #include <memory>
+#include <set>
 #include <system_error>
 
 namespace tunnelrig {
@@ -103,6 +104,27 @@ std::vector<Gap> read_gaps(const fs::path& path, std::uint64_t frames) {
                     sheet.text(row, "cause"), estimated == "1"});
   }
   return gaps;
+}
+
+/// Gaps that belong to none of the arrays, by their name: what they say is lost would not count.
+std::vector<std::string> unread_gaps(const fs::path& folder, const std::vector<Run>& runs) {
+  std::set<fs::path> read, places;
+  for (const Run& run : runs) {
+    if (run.raw.empty()) continue;
+    const fs::path gaps = gaps_path((folder / run.raw).lexically_normal());
+    read.insert(gaps);
+    places.insert(gaps.parent_path());
+  }
+  std::vector<std::string> doubts;
+  for (const fs::path& place : places) {
+    std::error_code error;
+    for (const fs::directory_entry& entry : fs::directory_iterator(place, error))
+      if (entry.path().filename().string().ends_with(".gaps.csv") && !read.contains(entry.path()))
+        doubts.push_back(fmt::format("{}: not read, since no run has an array of that name beside it",
+                                     entry.path().lexically_relative(folder).generic_string()));
+  }
+  std::ranges::sort(doubts);
+  return doubts;
 }
 
 template <typename Float>
@@ -346,6 +368,7 @@ ImportSummary import_campaign_folder(const fs::path& folder, const fs::path& fil
     if (options.progress) options.progress(++done, text.parsed_runs.size());
   }
   raw.finish();
+  for (std::string& doubt : unread_gaps(folder, text.parsed_runs)) summary.doubts.push_back(std::move(doubt));
   for (std::string& doubt : calibration_doubts(campaign, campaign.calibration_points()))
     summary.doubts.push_back(std::move(doubt));
   staged.publish();

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <set>
 
@@ -94,6 +95,19 @@ void doubt_labels_of_places(const CampaignInfo& info, const Sheet& sheet, const 
       sheet.file, first->line, first->location, count, count == 1 ? "run counts as" : "runs count as"));
 }
 
+/// A row that was copied, and its array with it: the same data would count twice.
+void doubt_arrays(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doubts) {
+  std::map<std::string, const Run*> first;
+  for (const Run& run : runs) {
+    if (run.raw.empty()) continue;
+    const auto [found, fresh] =
+        first.emplace(std::filesystem::path(run.raw).lexically_normal().string(), &run);
+    if (!fresh)
+      doubts.push_back(fmt::format("{}:{}: run {} has the array of run {}, {}: was the row copied?",
+                                   sheet.file, run.line, run.run, found->second->run, run.raw));
+  }
+}
+
 /// Two days under one label, or a clock that jumped: what drifts within a session is measured from its first
 /// run.
 void doubt_sessions(const Sheet& sheet, const std::vector<Run>& runs, Doubts& doubts) {
@@ -177,6 +191,7 @@ std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& ru
   if (!cause_said) doubt_thrusts(info, runs_sheet, runs, doubts);
   doubt_places(runs_sheet, runs, doubts);
   doubt_labels_of_places(info, runs_sheet, runs, doubts);
+  doubt_arrays(runs_sheet, runs, doubts);
   doubt_sessions(runs_sheet, runs, doubts);
   doubt_stuck(runs_sheet, runs, doubts);
   return doubts;

@@ -13,7 +13,7 @@ namespace tunnelrig {
 
 /// A sentence each, naming file and line: keys of campaign.toml that nothing reads, columns that are ours but
 /// for capitals, columns of the user's that one text makes a label, sessions in another unit (unit_doubts.h),
-/// thrusts that no rotor of this size gives, a location at two places or off the grid,
+/// thrusts that no rotor of this size gives, a location at two places or off the grid, two runs of one array,
 /// sessions of more than a day, a sensor that seems stuck.
 std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& runs_sheet,
                                        const std::vector<Run>& runs);

@@ -14,7 +14,7 @@ constexpr double kGravity = 9.80665;   // m/s², standard
 constexpr double kPound = 0.45359237;  // kg
 constexpr double kPi = std::numbers::pi;
 
-constexpr std::array<Unit, 97> kUnits = {{
+constexpr std::array<Unit, 100> kUnits = {{
     {"1", "number", 1, 0},
     {"", "number", 1, 0},
     {kTextUnit, "text", 1, 0},
@@ -110,6 +110,9 @@ constexpr std::array<Unit, 97> kUnits = {{
     {"ozf·in", "torque", kPound* kGravity / 16 * 0.0254, 0},
     {"lbf·in", "torque", kPound* kGravity * 0.0254, 0},
     {"lbf·ft", "torque", kPound* kGravity * 0.3048, 0},
+    {"gf·cm", "torque", kGravity * 1e-5, 0},
+    {"kgf·cm", "torque", kGravity * 1e-2, 0},
+    {"kgf·m", "torque", kGravity, 0},
     {"N/W", "efficiency", 1, 0},
     {"gf/W", "efficiency", kGravity * 1e-3, 0},
 }};

@@ -77,7 +77,7 @@ TEST_F(Streams, RefusedPacketsAreSaidEvenWhereNothingIsLost) {
   const ProgramResult result = log("0.024");
   EXPECT_EQ(result.code, 1);
   EXPECT_THAT(result.out, HasSubstr(": 32 frames, 0 lost"));
-  EXPECT_THAT(result.error, HasSubstr("run R0001: 1 packets were refused"));
+  EXPECT_THAT(result.error, HasSubstr("run R0001: 1 packet was refused"));
 }
 
 TEST_F(Streams, WithoutAPacketNoChannelIsStuck) {

@@ -101,6 +101,14 @@ TEST_F(Folder, GapsComeBackWithTheColumnsThatTheyHad) {
   }
 }
 
+TEST_F(Folder, GapsOfNoArrayAreSaid) {
+  campaign.write(source);
+  write_text(source / "raw/R2.npy.gaps.csv", "first_frame,frames_lost\n10,3\n");
+  EXPECT_THAT(import_campaign_folder(source, db, options()).doubts,
+              testing::ElementsAre(
+                  "raw/R2.npy.gaps.csv: not read, since no run has an array of that name beside it"));
+}
+
 class FolderTypes : public Folder, public testing::WithParamInterface<SampleType> {};
 
 TEST_P(FolderTypes, ArraysKeepTypeAndValues) {

@@ -160,5 +160,13 @@ TEST(ImportDoubts, ALocationStandsAtOnePlace) {
               ElementsAre("runs.csv:3: location here stands elsewhere than in run A: it cannot be reduced"));
 }
 
+TEST(ImportDoubts, AnArrayIsOfOneRun) {
+  EXPECT_THAT(doubts(kToml,
+                     "run,location,repeat,session,start_utc,raw\n"
+                     "A,H1V1,1,S,2026-03-02T08:00:00Z,raw/A.npy\n"
+                     "B,H1V1,2,S,2026-03-02T08:10:00Z,raw//A.npy\n"),
+              ElementsAre("runs.csv:3: run B has the array of run A, raw//A.npy: was the row copied?"));
+}
+
 }  // namespace
 }  // namespace tunnelrig
