@@ -12,6 +12,28 @@ namespace tunnelrig {
 Explanation explain_once(const Observations& observations, const std::vector<const Effect*>& effects,
                          const SearchSettings& settings);
 
+// --- estimate_on_all.cpp
+
+/// A model with the scatter that its fit to the open runs allows for.
+struct Fitted {
+  Observations data;
+  JointFit fit;
+};
+
+/// What is held against what: the data with what the search gave groups of their own, and without.
+struct Models {
+  const Observations& wide;
+  const Observations& alone;
+  const Fitted& baseline;
+  const Attribution& found;
+};
+
+/// Parameters with their intervals, structure that the open runs were too few to show, rows that are off, and
+/// what speaks against any of it.
+void estimate_on_all(const Models& models, const Observations& observations,
+                     const std::vector<const Effect*>& effects, const SearchSettings& settings,
+                     Explanation& explanation);
+
 // --- conditions.cpp
 
 /// Effects that cannot be tried and why; conditions that nothing can be found to follow, because they never

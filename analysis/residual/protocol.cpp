@@ -1,5 +1,6 @@
 // The protocol, once: seal, search on the open runs, open the seal, estimate on all.
 #include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/scores.h"
 #include "calibration/distributions.h"
 #include "datasets/error.h"
 #include "datasets/first_few.h"
@@ -20,21 +21,9 @@ using Eigen::MatrixXd;
 constexpr int kFewestBlocks = 6;
 constexpr std::size_t kFewestOpenBlocks = 4;  // of six, the seal leaves as many
 
-/// Errors of the fitted runs themselves, n × c in the unit.
-MatrixXd residuals(const Observations& observations, const JointFit& fit, const std::vector<int>& rows) {
-  const Components y = difference(response_components(observations), fit.linear.offset);
-  return predict_held_out(observations, y, fit.linear.columns, fit.variances, rows, rows).error;
-}
-
 /// Response per unit of y.
 double scale_of(const Observations& observations) {
   return observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
-}
-
-double rms(const MatrixXd& errors) {
-  const auto missing = errors.array().isNaN();
-  const Index count = errors.size() - missing.count();
-  return count == 0 ? 0 : std::sqrt(missing.select(0, errors).squaredNorm() / static_cast<double>(count));
 }
 
 /// Whether the sealed runs speak against a model: they are predicted clearly worse than without it, and worse
@@ -58,18 +47,6 @@ bool is_beyond_floor(const Observations& observations, const ErrorEstimate& esti
   const double ratio = estimate.held_out_rmse / noise_floor;
   return estimate.held_out_low > kFarAboveFloor * noise_floor ||
          (ratio > kFarAboveFloor && ratio * ratio > chi2_quantile(kCertain, blocks) / blocks);
-}
-
-HeldOutErrors score(const Observations& observations, const JointFit& fit, const std::vector<int>& fit_rows,
-                    const std::vector<int>& test_rows) {
-  const Components y = difference(response_components(observations), fit.linear.offset);
-  return predict_held_out(observations, y, fit.linear.columns, fit.variances, fit_rows, test_rows);
-}
-
-/// Errors of the fitted runs, each block predicted from the others.
-HeldOutErrors left_out(const Observations& observations, const JointFit& fit, const std::vector<int>& rows) {
-  const Components y = difference(response_components(observations), fit.linear.offset);
-  return cross_validate(observations, y, fit.linear.columns, fit.variances, rows).all();
 }
 
 /// The named terms as they were found beside the curves: fitted without them, they would take up what the
@@ -134,45 +111,6 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
   explanation.verdict = "insufficient";
 }
 
-void report_adopted(const Observations& observations, const Attribution& found, const JointFit& whole,
-                    const std::vector<int>& rows, Explanation& explanation) {
-  const auto parameters = estimate_parameters(observations, whole, rows);
-  for (std::size_t t = 0; t < found.accepted.size(); ++t) {
-    const Accepted& accepted = found.accepted[t];
-    AdoptedEffect adopted{.term = whole.model.terms[t],
-                          .parameters = parameters[t],
-                          .p_value = accepted.p,
-                          .held_out_gain = accepted.gain,
-                          .at_bound = at_bound(whole, accepted.term),
-                          .confounded_with = {},
-                          .separating_run = {}};
-    if (adopted.term.per_group)
-      adopted.parameters[0] =
-          summary_of_groups(adopted.term.effect->parameters[0],
-                            estimate_by_group(observations, whole.model, t, whole.variances, rows));
-    for (std::size_t k = 0; k < adopted.parameters.size(); ++k)
-      adopted.parameters[k].unit = unit_of(observations, adopted.term.effect->parameters[k]);
-    for (const Ranked& rival : accepted.confounded)
-      adopted.confounded_with.push_back(rival.term.effect->cause());
-    if (!accepted.confounded.empty())
-      adopted.separating_run =
-          separating_run(observations, accepted.term, accepted.confounded[0].term, found.final, rows);
-    explanation.adopted.push_back(std::move(adopted));
-  }
-}
-
-/// Change-points as the runs are numbered, where the search counted rows.
-void number_change_points(const Observations& observations, const std::vector<ChangePoint>& change_points,
-                          Explanation& explanation) {
-  const Covariate* order = observations.find("run_order");
-  if (order == nullptr) return;
-  for (const ChangePoint& point : change_points) {
-    ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
-    for (double* place : {&estimate.value, &estimate.low, &estimate.high})
-      *place = order->value(static_cast<Eigen::Index>(*place), 0);
-  }
-}
-
 std::string only_sealed_in_words(const std::vector<std::string>& groups) {
   constexpr std::size_t kNamed = 5;
   return "runs in sealed blocks only, so not scored: " + first_few(groups, kNamed);
@@ -196,12 +134,6 @@ Explanation begin_explanation(const Observations& observations) {
   return explanation;
 }
 
-/// A model with the scatter that its fit to the open runs allows for.
-struct Fitted {
-  Observations data;
-  JointFit fit;
-};
-
 /// Whichever predicts open blocks from the others better.
 Fitted better_of(Fitted one, Fitted other, const std::vector<int>& open) {
   const auto unseen = [&](const Fitted& model) { return rms(left_out(model.data, model.fit, open).error); };
@@ -217,14 +149,6 @@ Fitted fairest_baseline(const Observations& given, const Observations& alone, co
   if (alone.scatter.alike()) return with_scatter;
   return better_of(std::move(with_scatter), {given, fit_jointly(given, {}, open)}, open);
 }
-
-/// What is held against what: the data with what the search gave groups of their own, and without.
-struct Models {
-  const Observations& wide;
-  const Observations& alone;
-  const Fitted& baseline;
-  const Attribution& found;
-};
 
 void report_search(const Attribution& found, const Observations& observations, const SearchSettings& settings,
                    Explanation& explanation) {
@@ -313,60 +237,6 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
   explanation.sealed.beyond_floor = is_beyond_floor(alone, all, explanation.noise_floor, scored);
   explanation.before.rmse = rms(residuals(baseline.data, baseline.fit, seal.open));
   explanation.after.rmse = rms(residuals(shown.data, shown.fit, seal.open));
-}
-
-/// Names are settled, but a structure that the open blocks are too few for is one all the same.
-void report_structure_left(const StructureLeft& left, const Observations& observations,
-                           const std::vector<int>& rows, Explanation& explanation) {
-  for (const std::size_t t : left.bent) explanation.adopted[t].bends_away = true;
-  for (const FoundCurve& curve : left.curves) {
-    explanation.unknown.push_back(describe(observations, left.fit, curve, rows));
-    explanation.unknown.back().by_sealed_too = true;
-    explanation.by_sealed_too.push_back(curve.curve);
-  }
-  for (Round round : left.rounds) {
-    round.outcome = "all blocks, the sealed ones too: " + round.outcome;
-    explanation.curve_rounds.push_back(std::move(round));
-  }
-}
-
-void estimate_on_all(const Models& models, const Observations& observations,
-                     const std::vector<const Effect*>& effects, const SearchSettings& settings,
-                     Explanation& explanation) {
-  const auto& [wide, alone, baseline, found] = models;
-  const std::vector<int> rows = observations.all_rows();
-  std::vector<ChangePoint> change_points;
-  const JointFit whole =
-      fit_jointly(wide, with_change_points_of_all(wide, found.final.model, change_points), rows);
-  explanation.model = whole.model;
-  explanation.scatter = wide.scatter;
-  explanation.residual_before = residuals(baseline.data, fit_jointly(baseline.data, {}, rows), rows);
-  const HeldOutErrors fitted = score(wide, whole, rows, rows);
-  explanation.residual_after = fitted.error;
-  report_adopted(wide, found, whole, rows, explanation);
-  for (const ChangePoint& point : change_points) {
-    ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
-    estimate.low = point.low;
-    estimate.high = point.high;
-    estimate.run = observations.name[static_cast<std::size_t>(estimate.value)];
-    constexpr double kMostOfTheCourse = 0.5;
-    explanation.adopted[point.term].anywhere |=
-        point.high - point.low > kMostOfTheCourse * static_cast<double>(rows.size());
-  }
-  warn_of_doubts(explanation);
-  warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);
-  for (const FoundCurve& curve : found.curves)
-    explanation.unknown.push_back(describe(wide, whole, curve, rows));
-  report_structure_left(structure_left(found, whole, rows, effects, settings), wide, rows, explanation);
-  if (found.session_unknown && explanation.unknown.empty())
-    explanation.unknown.push_back(
-        describe_sessions(observations, fitted.error, *found.session_unknown, rows));
-  explanation.suspect_rows =
-      suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
-  warn_of_alike_rows(observations, explanation);
-  warn_of_tares(wide, whole.model, explanation);
-  warn_of_changes_at_steps(observations, explanation);
-  number_change_points(observations, change_points, explanation);
 }
 
 }  // namespace
