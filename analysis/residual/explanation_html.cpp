@@ -1,6 +1,7 @@
 // The explanation's page: what its scripts draw (analysis/report/page/explanation*.js), as one document.
 #include "analysis/report/render.h"
 #include "analysis/residual/explanation_output.h"
+#include "analysis/residual/null_maxima.h"
 #include "analysis/residual/upper_median.h"
 
 #include <algorithm>
@@ -113,12 +114,7 @@ class Page {
 
  private:
   static double critical(const Round& round, double alpha) {
-    if (round.null_maxima.empty()) return 0;
-    std::vector<double> sorted = round.null_maxima;
-    std::sort(sorted.begin(), sorted.end());
-    const auto rank =
-        static_cast<std::size_t>(std::ceil((1 - alpha) * static_cast<double>(sorted.size() + 1))) - 1;
-    return sorted[std::min(rank, sorted.size() - 1)];
+    return round.null_maxima.empty() ? 0 : critical_of(round.null_maxima, alpha);
   }
 
   static Json column(const MatrixXd& values, Index c) {

@@ -12,6 +12,14 @@
 
 namespace tunnelrig {
 
+/// What only α of the data sets exceed, of which these are the maxima; one at least.
+inline double critical_of(std::vector<double> maxima, double alpha) {
+  std::sort(maxima.begin(), maxima.end());
+  const auto rank =
+      static_cast<std::size_t>(std::ceil((1 - alpha) * static_cast<double>(maxima.size() + 1))) - 1;
+  return maxima[std::min(rank, maxima.size() - 1)];
+}
+
 /// Of data sets that are drawn from one null model, as they are asked for: early enough that a campaign
 /// without effect costs little, and never before the p that was asked for is settled (Besag & Clifford 1991).
 class DrawnMaxima {
@@ -34,12 +42,7 @@ class DrawnMaxima {
   /// The evidence that only α of the null campaigns exceed.
   double critical() {
     p(1e9);  // all of them
-    std::vector<double> sorted = maxima_;
-    std::sort(sorted.begin(), sorted.end());
-    const auto rank =
-        static_cast<std::size_t>(std::ceil((1 - settings_.alpha) * static_cast<double>(sorted.size() + 1))) -
-        1;
-    return sorted[std::min(rank, sorted.size() - 1)];
+    return critical_of(maxima_, settings_.alpha);
   }
   const std::vector<double>& values() const { return maxima_; }
 

@@ -99,6 +99,8 @@ class Search {
   bool lacks_speed_squared(const Term& term) const;
   /// Of a term that is a step, counted from the newest (1): from the run on where it is likeliest.
   JointFit at_best_run(JointFit fit, std::size_t from_newest) const;
+  /// All steps, where a curve is new that was a part of the scatter when they were placed.
+  void place_steps();
   // several of which none can be seen alone: search_several.cpp
   static void add_together(Scan& scan, const std::vector<std::size_t>& ways, double weight);
   void add_pairs_of_steps(Scan& scan) const;  // of two rotors at one run

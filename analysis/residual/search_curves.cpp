@@ -26,6 +26,7 @@ constexpr double kLittle_other = 0.02;
 void Search::add_curves(const CurveScan& first) {
   bool added = settings_.most_curves > 0 && add_best_curve(first);
   while (added) {
+    place_steps();
     drop_what_a_curve_replaces();
     add_effects();
     added = static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve(scan_curves());

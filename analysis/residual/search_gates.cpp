@@ -77,4 +77,9 @@ JointFit Search::at_best_run(JointFit fit, std::size_t from_newest) const {
   return there.variances.log_likelihood > fit.variances.log_likelihood ? there : fit;
 }
 
+void Search::place_steps() {
+  for (std::size_t k = 1; k <= fit_.model.terms.size(); ++k) fit_ = at_best_run(std::move(fit_), k);
+  read_back_terms();
+}
+
 }  // namespace tunnelrig

@@ -52,6 +52,26 @@ TEST_F(Steps, AGradualChangeIsNoStep) {
   EXPECT_EQ(e.verdict, "unknown");
 }
 
+/// A fan that is switched makes the runs scatter by as much as the step, until its curve is in: only then can
+/// be seen where the step is.
+TEST_F(Steps, IsPlacedAnewBesideACurve) {
+  Observations o = ordered();
+  const Index first = 8 * 8 + 3;
+  for (Index rotor = 0; rotor < 4; ++rotor) step(o, first, rotor, 0.012);
+  std::bernoulli_distribution coin(0.5);
+  Covariate fan{"fan_on", Eigen::VectorXd(o.rows())};
+  for (Index row = 0; row < o.rows(); ++row) fan.value(row, 0) = coin(random) ? 1 : 0;
+  o.covariates.push_back(fan);
+  test::set_y(o, o.y.colwise() + Eigen::VectorXd(0.02 * fan.value.col(0)));
+  const Attribution found =
+      attribute(o, seal_blocks(o, SearchSettings{}.seed).open, test::every_effect(), test::quick());
+  ASSERT_EQ(found.accepted.size(), 1u);
+  ASSERT_EQ(found.curves.size(), 1u);
+  EXPECT_EQ(found.curves[0].curve.covariate, "fan_on");
+  const auto open = seal_blocks(o, SearchSettings{}.seed).open;
+  EXPECT_EQ(first_row_of(found.accepted[0].term), *std::ranges::lower_bound(open, static_cast<int>(first)));
+}
+
 /// The search never sees the session in which the propeller was nicked; the final fit does, and finds nothing
 /// left beside it, however large the step is.
 TEST_F(Steps, AStepInASealedSessionIsPlacedThere) {
