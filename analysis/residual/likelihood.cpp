@@ -142,6 +142,8 @@ struct CandidateScan::Impl {
     }
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       double& of_this = result(static_cast<Index>(i));
+      // Of a column that is a sum of the adopted ones it may be anything, and takes nothing away.
+      if (!std::isfinite(of_this) || of_this < 0) of_this = 0;
       of_this = (*table_of[i])(kFactor * of_this + kMargin) + std::log10(candidates[i].weight);
     }
     return result;

@@ -1,6 +1,7 @@
 // Likelihood ratios against brute force on dense matrices.
 #include "analysis/residual/likelihood.h"
 
+#include "analysis/residual/score_ratios.h"
 #include "analysis/residual/simulated.h"
 #include "calibration/distributions.h"
 #include "support/seeds.h"
@@ -177,6 +178,82 @@ TEST(Likelihood, FourRotorsFindWhatOneRotorHas) {
   const auto fits = CandidateScan(model, {}, {{.columns = {{one}}}, {.columns = {{all}}}}).fit({o.y});
   EXPECT_GT(fits[0].evidence, fits[1].evidence + 3);
   EXPECT_NEAR(fits[0].amplitude(0), 0.003, 0.0015);
+}
+
+/// Four rotors, whose strata differ; two columns adopted, nine candidates of one column and one of three.
+struct Screened : testing::Test {
+  std::mt19937_64 random{test::seed() + 8};
+  Observations o = test::simulate(
+      {.runs_of_block = std::vector<int>(12, 8), .channels = 4, .sigma = 0.002, .session_ratio = 2}, random);
+  MixedModel model{o, o.all_rows()};
+  std::vector<Components> adopted = {{of_all()}, {of_one()}};
+  std::vector<Candidate> candidates;
+
+  MatrixXd of_all() { return normal_matrix(o.rows(), 1, random) * Eigen::RowVectorXd::Ones(4); }
+  MatrixXd of_one() {
+    MatrixXd column = MatrixXd::Zero(o.rows(), 4);
+    column.col(2) = normal_matrix(o.rows(), 1, random);
+    return column;
+  }
+  MatrixXd of_sessions() {
+    MatrixXd column = of_all();
+    for (Index row = 1; row < column.rows(); ++row)
+      if (o.block[static_cast<std::size_t>(row)] == o.block[static_cast<std::size_t>(row - 1)])
+        column.row(row) = column.row(row - 1);
+    return column;
+  }
+  void SetUp() override {
+    for (int i = 0; i < 3; ++i)
+      for (const MatrixXd& column : {of_all(), of_one(), of_sessions()})
+        candidates.push_back({.columns = {{column}}});
+    candidates.push_back({.columns = {{of_all()}, {of_all()}, {of_sessions()}}, .weight = 0.5});
+  }
+};
+
+TEST_F(Screened, AScoreIsTheRatioWhereVariancesAreHeld) {
+  MatrixXd y = o.y;
+  for (std::size_t i = 0; i < candidates.size(); i += 3) y += 0.0006 * candidates[i].columns[0][0];
+  std::vector<Index> widths(candidates.size(), 1);
+  widths.back() = 3;
+  const ScanProducts products(model, adopted, candidates);
+  const StrataFit fit(model, products, widths);
+  std::vector<Stacked> data;
+  const Components of_y = {y};
+  for (std::size_t s = 0; s < model.strata().size(); ++s) data.push_back(model.stack(s, {&of_y}));
+  const ScanProducts::Data times = products.times(data);
+  const StrataFit::State null = fit.best_without(times, 0);
+  const VectorXd scores = score_ratios(model, products, times, 0, null, widths);
+  double largest = 0;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    StrataFit::State with = null;
+    fit.solve(times, 0, static_cast<int>(i), with);
+    const double ratio = with.log_likelihood - null.log_likelihood, score = scores(static_cast<Index>(i));
+    EXPECT_NEAR(ratio, score, 0.05 + 0.2 * score) << i;
+    largest = std::max(largest, ratio);
+  }
+  EXPECT_GT(largest, 5);
+}
+
+/// The same data sets, each candidate alone: the largest of all is what is said of all together.
+TEST_F(Screened, NoMaximumIsLost) {
+  constexpr std::size_t kSets = 300;
+  const NullFit null = CandidateScan(model, adopted, {}).null_fit({o.y});
+  const auto maxima_of = [&](const std::vector<Candidate>& some) {
+    std::mt19937_64 same(test::seed());
+    return CandidateScan(model, adopted, some).simulated_maxima(null, kSets, same);
+  };
+  std::vector<double> expected(kSets, 0.0);
+  for (const Candidate& each : candidates) {
+    const std::vector<double> alone = maxima_of({each});
+    for (std::size_t set = 0; set < kSets; ++set) expected[set] = std::max(expected[set], alone[set]);
+  }
+  const std::vector<double> all = maxima_of(candidates);
+  int lost = 0;
+  for (std::size_t set = 0; set < kSets; ++set) {
+    EXPECT_LE(all[set], expected[set] + 1e-9);
+    if (all[set] < expected[set] - 1e-9) ++lost;
+  }
+  EXPECT_LE(lost, 6);
 }
 
 TEST(NullFit, ScatterAllowsForWhatTheColumnsCost) {
