@@ -52,9 +52,22 @@ bool is_ratio(const Observations& observations, const Covariate& covariate) {
          covariate.value.minCoeff() > 0;
 }
 
-std::vector<CurveShape> bends_over(const Observations& observations, const Covariate& covariate) {
-  if (is_ratio(observations, covariate)) return {CurveShape::kLogParabola, CurveShape::kLevelling};
-  return {CurveShape::kParabola};
+/// Whether low/x is 1 in one row of many and little in all others: a wind that was nearly still once.
+bool lowest_stands_alone(const Covariate& covariate, const std::vector<int>& rows) {
+  constexpr std::size_t kMany = 40;  // in a ladder of a few settings every row is one of its own
+  constexpr double kAlone = 2.5;     // times the lowest
+  if (rows.size() < kMany) return false;
+  const MatrixXd values = covariate.value(rows, Eigen::all);
+  std::vector<double> lowest(values.reshaped().begin(), values.reshaped().end());
+  std::partial_sort(lowest.begin(), lowest.begin() + 2, lowest.end());
+  return lowest[1] > kAlone * lowest[0];
+}
+
+std::vector<CurveShape> bends_over(const Observations& observations, const Covariate& covariate,
+                                   const std::vector<int>& rows) {
+  if (!is_ratio(observations, covariate)) return {CurveShape::kParabola};
+  if (lowest_stands_alone(covariate, rows)) return {CurveShape::kLogParabola};
+  return {CurveShape::kLogParabola, CurveShape::kLevelling};
 }
 
 /// Where a curve may be seen: beyond it, in runs that are sealed, it could be anything.
@@ -120,7 +133,7 @@ class CurvesToTry {
           is_ratio(observations_, covariate) ? CurveShape::kLogStraight : CurveShape::kStraight, 1, place);
     const int most = places_on_range(covariate, rows_) / 3;
     if (most >= 1)
-      for (const CurveShape bend : bends_over(observations_, covariate)) add(covariate, over, bend, 1);
+      for (const CurveShape bend : bends_over(observations_, covariate, rows_)) add(covariate, over, bend, 1);
     // Where a whole wave finds no row its height is anything.
     const double gap = most >= kBends[1] ? widest_gap(covariate, rows_) : 0;
     for (const int count : kBends)

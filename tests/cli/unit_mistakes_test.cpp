@@ -112,7 +112,8 @@ TEST_F(UnitMistakes, ASessionInAnotherUnit) {
   EXPECT_EQ(imported.code, 0);
   EXPECT_EQ(imported.error,
             "warning: runs.csv:4, column air_temperature_C: session S2 has 68.5, all others 19 to 20.7; from "
-            "degF these would be 20.3: another unit?\n");
+            "degF these would be 20.3: another unit?\n"
+            "warning: runs.csv:5: run R4 has the array of run R3, raw/R3.npy: was the row copied?\n");
 }
 
 TEST_F(UnitMistakes, ABlockOfATableInAnotherUnit) {

@@ -4,6 +4,7 @@
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -128,6 +129,22 @@ TEST_F(Gates, WhatLiesBeyondItsBoundsIsSaidWithItsSize) {
   EXPECT_THAT(e.warnings,
               Contains(testing::ContainsRegex(fmt::format(
                   "supply_voltage fitted best by far, but its exponent would be {:.0f}", most + 1))));
+}
+
+/// low/x would be the indicator of one run, and that run's scatter a dependence. A ladder of a few settings
+/// is meant as it is.
+TEST_F(Gates, WhatIsLowInOneRunOfManyDoesNotLevelOff) {
+  Observations o = observations();
+  test::add_covariate(o, "tunnel_airspeed_m_s", 0.2, 4, random);
+  const auto levels_off = [&](const std::vector<int>& rows) {
+    return std::ranges::any_of(curves_to_try(o, rows),
+                               [](const Curve& curve) { return curve.shape == CurveShape::kLevelling; });
+  };
+  const std::vector<int> all = o.all_rows();
+  EXPECT_TRUE(levels_off(all));
+  o.covariates.back().value(7, 0) = 0.05;
+  EXPECT_FALSE(levels_off(all));
+  EXPECT_TRUE(levels_off({all.begin(), all.begin() + 20}));
 }
 
 TEST_F(Gates, AnEndAtMaxEffectsIsSaid) {
