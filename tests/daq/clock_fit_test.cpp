@@ -1,6 +1,8 @@
 // The fitted clock: right within its interval, and silent where it cannot know.
 #include "daq/clock_fit.h"
 
+#include "support/seeds.h"
+
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -32,7 +34,7 @@ ClockFit fit_of(double seconds, double ppm, double ppm_h, std::uint64_t seed, do
 }
 
 TEST(ClockFit, FindsTheRateWithinItsInterval) {
-  const std::uint64_t seed = std::random_device{}();
+  const std::uint64_t seed = test::seed();
   SCOPED_TRACE(seed);
   const double truth_hz = 4000.0 / 3.0 * (1 + 37e-6);
   int inside = 0;
@@ -40,14 +42,14 @@ TEST(ClockFit, FindsTheRateWithinItsInterval) {
     const auto found = fit_of(60, 37, 0, seed + i).estimate();
     ASSERT_TRUE(found);
     EXPECT_LT(found->rate_interval_hz / truth_hz, 1e-5);
-    EXPECT_NEAR(found->span_s, 60, 2.1);
+    EXPECT_NEAR(found->span_s, 60, 3);
     inside += std::abs(found->rate_hz - truth_hz) < found->rate_interval_hz ? 1 : 0;
   }
   EXPECT_GE(inside, 178);  // 190 expected; below 178 once in 10^4
 }
 
 TEST(ClockFit, ABacklogSaysNothingAboutTheClock) {
-  const std::uint64_t seed = std::random_device{}();
+  const std::uint64_t seed = test::seed();
   SCOPED_TRACE(seed);
   const double truth_hz = 4000.0 / 3.0 * (1 + 37e-6);
   for (const double from_s : {1e-9, 1.0, 7.0, 13.0, 25.0, 27.9}) {
