@@ -15,14 +15,14 @@ namespace tunnelrig {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-void warn_of_bounds(const Attribution& found, Explanation& explanation) {
+void warn_of_bounds(const Observations& observations, const Attribution& found, Explanation& explanation) {
   std::set<std::string> said;  // of each effect once
   for (const Accepted& accepted : found.accepted) said.insert(accepted.term.effect->name);
   for (const BeyondBounds& beyond : found.beyond_bounds) {
     const Effect& effect = *beyond.term.effect;
     if (!said.insert(effect.name).second) continue;
     const EffectParameter& amplitude = effect.parameters[0];
-    const std::string unit = amplitude.unit == "1" ? "" : " " + amplitude.unit;
+    const std::string own = unit_of(observations, amplitude), unit = own == "1" ? "" : " " + own;
     explanation.warnings.push_back(fmt::format(
         "of all candidates {} fitted best by far, but its {} would be {:.3g}{}, and its physical bounds are "
         "{:.3g} to {:.3g}{}: it is not named, and what is found beside it may be its work",

@@ -27,7 +27,7 @@ void report_adopted(const Observations& observations, const Attribution& found, 
       adopted.confounded_with.push_back(rival.term.effect->cause());
     if (!accepted.confounded.empty())
       adopted.separating_run =
-          separating_run(observations, accepted.term, accepted.confounded[0].term, found.final, rows);
+          separating_run(observations, found.final, t, accepted.confounded[0].term, rows);
     explanation.adopted.push_back(std::move(adopted));
   }
 }

@@ -155,9 +155,8 @@ Observations without_set_aside(const Observations& observations, const Explanati
 /// the response's unit.
 std::string unit_of(const Observations& observations, const EffectParameter& parameter);
 
-/// The setting that tells `first` from `second` best, among conditions the rig has nearly seen.
-std::optional<SeparatingRun> separating_run(const Observations& observations, const Term& first,
-                                            const Term& second, const JointFit& fit,
-                                            const std::vector<int>& rows);
+/// The setting that tells the fit's term `t` from `rival` best, among conditions the rig has nearly seen.
+std::optional<SeparatingRun> separating_run(const Observations& observations, const JointFit& fit,
+                                            std::size_t t, const Term& rival, const std::vector<int>& rows);
 
 }  // namespace tunnelrig

@@ -51,7 +51,7 @@ void warn_of_scatter(const Observations& observations, Explanation& explanation)
 // --- doubts.cpp
 
 /// Candidates that would be named, were it not for their physical bounds.
-void warn_of_bounds(const Attribution& found, Explanation& explanation);
+void warn_of_bounds(const Observations& observations, const Attribution& found, Explanation& explanation);
 
 /// What the opened seal and the intervals say against what was adopted.
 void warn_of_doubts(Explanation& explanation);

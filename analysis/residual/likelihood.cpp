@@ -3,7 +3,6 @@
 #include "analysis/residual/evidence_table.h"
 #include "analysis/residual/in_two_threads.h"
 #include "analysis/residual/scan_products.h"
-#include "analysis/residual/score_ratios.h"
 #include "analysis/residual/strata_fit.h"
 
 #include <algorithm>
@@ -124,8 +123,7 @@ struct CandidateScan::Impl {
   Eigen::VectorXd most_evidence(const Data& data, Index set, const State& null) const {
     constexpr double kFactor = 1.3, kMargin = 1.5;  // its variances are smaller with it
     const auto ratios_at = [&](const State& state) -> Eigen::VectorXd {
-      return score_ratios(model, columns, data, set, state, widths).array() +
-             (state.log_likelihood - null.log_likelihood);
+      return strata.scores(data, set, state).array() + (state.log_likelihood - null.log_likelihood);
     };
     const Eigen::VectorXd held = ratios_at(null);
     Eigen::VectorXd result = held;

@@ -157,7 +157,7 @@ void report_search(const Attribution& found, const Observations& observations, c
         fmt::format("the search ended with {} effects, as many as --max-effects allows: where there are "
                     "more, these may be wrong; try more",
                     found.accepted.size()));
-  warn_of_bounds(found, explanation);
+  warn_of_bounds(observations, found, explanation);
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
   explanation.detectable = found.detectable_sigma * scale_of(observations);

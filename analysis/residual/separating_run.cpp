@@ -136,17 +136,15 @@ MatrixXd forces_at(const Observations& observations, const MatrixXd& predicted,
 
 /// Difference of the two effects' predictions, every setting against the ordinary run before it, in σ of such
 /// a pair; 0 where either turns the sign of a response that has had only one.
-VectorXd distances(const Observations& observations, const Term& first, const Term& second,
-                   const JointFit& fit, const std::vector<Setting>& settings,
-                   const std::vector<std::size_t>& ordinary, const std::vector<int>& rows) {
+VectorXd distances(const Observations& observations, const JointFit& fit, std::size_t t, const Term& rival,
+                   const std::vector<Setting>& settings, const std::vector<std::size_t>& ordinary,
+                   const std::vector<int>& rows) {
   const Observations at = imagined(observations, settings);
-  std::size_t t = 0;
-  while (!fit.model.terms[t].same_way(first)) ++t;
   const MatrixXd forces =
       forces_at(observations, predict_forces(observations, fit.model, rows).acted_on[t], settings);
-  const MatrixXd by_first = respond(first, at, forces).value[0],
-                 by_second = respond(second, at, forces).value[0];
-  MatrixXd difference = by_first - by_second;
+  const MatrixXd by_own = respond(fit.model.terms[t], at, forces).value[0],
+                 by_rival = respond(rival, at, forces).value[0];
+  MatrixXd difference = by_own - by_rival;
   const MatrixXd usual = difference(std::vector<Index>(ordinary.begin(), ordinary.end()), Eigen::all);
   difference -= usual;
   const MixedModel mixed = MixedModel::baseline_alone(observations, rows);
@@ -164,9 +162,8 @@ VectorXd distances(const Observations& observations, const Term& first, const Te
   const bool one_sign = (observations.value.array() > 0).all() || (observations.value.array() < 0).all();
   if (one_sign && !observations.multiplicative)
     for (Index s = 0; s < squares.size(); ++s)
-      if ((forces.row(s).cwiseProduct(forces.row(s) + by_first.row(s)).array() <= 0).any() ||
-          (forces.row(s).cwiseProduct(forces.row(s) + by_second.row(s)).array() <= 0).any())
-        squares(s) = 0;
+      for (const MatrixXd* made : {&by_own, &by_rival})
+        if ((forces.row(s).array() * (forces.row(s) + made->row(s)).array() <= 0).any()) squares(s) = 0;
   return squares.array().sqrt() / scatter;
 }
 
@@ -185,10 +182,9 @@ std::string in_words(const SeparatingRun& run, const Observations& observations)
 
 }  // namespace
 
-std::optional<SeparatingRun> separating_run(const Observations& observations, const Term& first,
-                                            const Term& second, const JointFit& fit,
-                                            const std::vector<int>& rows) {
-  const std::vector<const Covariate*> conditions = conditions_of(observations, first, second);
+std::optional<SeparatingRun> separating_run(const Observations& observations, const JointFit& fit,
+                                            std::size_t t, const Term& rival, const std::vector<int>& rows) {
+  const std::vector<const Covariate*> conditions = conditions_of(observations, fit.model.terms[t], rival);
   if (conditions.empty()) return {};
   std::vector<Setting> settings;
   std::vector<std::size_t> ordinary;  // the setting that each is compared with
@@ -197,7 +193,7 @@ std::optional<SeparatingRun> separating_run(const Observations& observations, co
     for (Setting& setting : variations(usual, conditions)) settings.push_back(std::move(setting));
     ordinary.resize(settings.size(), at);
   }
-  const VectorXd distance = distances(observations, first, second, fit, settings, ordinary, rows);
+  const VectorXd distance = distances(observations, fit, t, rival, settings, ordinary, rows);
   SeparatingRun best;
   for (std::size_t s = 0; s < settings.size(); ++s) {
     const double sigma = distance(static_cast<Index>(s));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace tunnelrig {
 
@@ -27,9 +28,7 @@ void StrataFit::solve(const Data& data, Index set, int candidate, State& state) 
       SmallVector b = SmallVector::Zero(k);
       for (std::size_t s = 0; s < strata; ++s)
         if (concerns(candidate, s)) accumulate(data, set, candidate, s, state, a, b);
-      a.diagonal().array() *= 1 + 1e-12;
-      a.diagonal().array() += 1e-300;
-      state.amplitude = a.ldlt().solve(b);
+      state.amplitude = factored(std::move(a)).solve(b);
       for (std::size_t s = 0; s < strata; ++s)
         if (concerns(candidate, s)) state.rss[s] = residual(data, set, candidate, s, state);
     }
@@ -46,7 +45,7 @@ void StrataFit::solve_alone(const Data& data, Index set, std::size_t candidate, 
     for (std::size_t s = 0; s < model_.strata().size(); ++s) {
       if (!columns_.touches(candidate, s)) continue;
       const std::size_t ratio = state.ratio[s];
-      const double weight = static_cast<double>(model_.dof(s)) / std::max(state.rss[s], 1e-300);
+      const double weight = this->weight(s, state);
       a += weight * columns_.products(s, ratio).candidate[candidate](0, 0);
       b += weight * data[s][ratio].columns(column, set);
     }
@@ -62,6 +61,16 @@ void StrataFit::solve_alone(const Data& data, Index set, std::size_t candidate, 
   }
 }
 
+double StrataFit::weight(std::size_t s, const State& state) const {
+  return static_cast<double>(model_.dof(s)) / std::max(state.rss[s], 1e-300);
+}
+
+Eigen::LDLT<SmallMatrix> StrataFit::factored(SmallMatrix normal) {
+  normal.diagonal().array() *= 1 + 1e-12;
+  normal.diagonal().array() += 1e-300;
+  return normal.ldlt();
+}
+
 double StrataFit::stratum_likelihood(std::size_t s, std::size_t ratio, double rss) const {
   const double dof = static_cast<double>(model_.dof(s));
   return -0.5 * dof * std::log(std::max(rss, 1e-300) / dof) - model_.log_determinant(s, ratio);
@@ -71,7 +80,7 @@ void StrataFit::accumulate(const Data& data, Index set, int candidate, std::size
                            SmallMatrix& a, SmallVector& b) const {
   const ScanProducts::Products& p = columns_.products(s, state.ratio[s]);
   const auto y = data[s][state.ratio[s]].columns.col(set);
-  const double weight = static_cast<double>(model_.dof(s)) / std::max(state.rss[s], 1e-300);
+  const double weight = this->weight(s, state);
   a.topLeftCorner(adopted_, adopted_) += weight * p.adopted_adopted;
   b.head(adopted_) += weight * y.head(adopted_);
   if (candidate < 0) return;
@@ -81,6 +90,37 @@ void StrataFit::accumulate(const Data& data, Index set, int candidate, std::size
       weight * p.adopted_candidate.middleCols(columns_.first(i), own).transpose();
   a.bottomRightCorner(own, own) += weight * p.candidate[i];
   b.tail(own) += weight * y.segment(columns_.first(i), own);
+}
+
+Eigen::VectorXd StrataFit::scores(const Data& data, Index set, const State& held) const {
+  const Index columns = data[0][0].columns.rows() - adopted_;
+  SmallMatrix normal = SmallMatrix::Zero(adopted_, adopted_);
+  SmallVector of_adopted = SmallVector::Zero(adopted_);
+  Eigen::MatrixXd beside = Eigen::MatrixXd::Zero(adopted_, columns), on_adopted = beside;
+  Eigen::VectorXd with_data = Eigen::VectorXd::Zero(columns);
+  for (std::size_t s = 0; s < held.ratio.size(); ++s) {
+    with_data += weight(s, held) * data[s][held.ratio[s]].columns.col(set).tail(columns);
+    if (!columns_.adopted_touch(s)) continue;
+    accumulate(data, set, -1, s, held, normal, of_adopted);
+    beside += weight(s, held) * columns_.products(s, held.ratio[s]).adopted_candidate.rightCols(columns);
+  }
+  if (adopted_ > 0) {
+    on_adopted = factored(std::move(normal)).solve(beside);
+    with_data -= on_adopted.transpose() * of_adopted;
+  }
+  Eigen::VectorXd result(widths_.size());
+  for (std::size_t i = 0; i < widths_.size(); ++i) {
+    const Index own = widths_[i], first = columns_.first(i) - adopted_;
+    SmallMatrix information = -beside.middleCols(first, own).transpose() * on_adopted.middleCols(first, own);
+    for (std::size_t s = 0; s < held.ratio.size(); ++s)
+      if (columns_.touches(i, s))
+        information += weight(s, held) * columns_.products(s, held.ratio[s]).candidate[i];
+    const auto score = with_data.segment(first, own);
+    result(static_cast<Index>(i)) =
+        0.5 * (own == 1 ? score(0) * score(0) / std::max(information(0, 0), 1e-300)
+                        : score.dot(information.ldlt().solve(score)));
+  }
+  return result;
 }
 
 double StrataFit::spent(const Data& data, const State& state, std::size_t stratum) const {

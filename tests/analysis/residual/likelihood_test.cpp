@@ -1,8 +1,8 @@
 // Likelihood ratios against brute force on dense matrices.
 #include "analysis/residual/likelihood.h"
 
-#include "analysis/residual/score_ratios.h"
 #include "analysis/residual/simulated.h"
+#include "analysis/residual/strata_fit.h"
 #include "calibration/distributions.h"
 #include "support/seeds.h"
 
@@ -222,7 +222,7 @@ TEST_F(Screened, AScoreIsTheRatioWhereVariancesAreHeld) {
   for (std::size_t s = 0; s < model.strata().size(); ++s) data.push_back(model.stack(s, {&of_y}));
   const ScanProducts::Data times = products.times(data);
   const StrataFit::State null = fit.best_without(times, 0);
-  const VectorXd scores = score_ratios(model, products, times, 0, null, widths);
+  const VectorXd scores = fit.scores(times, 0, null);
   double largest = 0;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     StrataFit::State with = null;
