@@ -1,7 +1,7 @@
 #include "analysis/implausible_thrust.h"
 
 #include "analysis/conventions.h"
-#include "analysis/residual/upper_median.h"
+#include "analysis/upper_median.h"
 #include "datasets/error.h"
 #include "datasets/locations.h"
 #include "datasets/plausible.h"

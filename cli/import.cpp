@@ -1,4 +1,4 @@
-#include "analysis/residual/observations.h"
+#include "analysis/residual/observations/observations.h"
 #include "analysis/run_summary.h"
 #include "cli/console.h"
 #include "cli/verb.h"

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include <fmt/format.h>
+
 namespace tunnelrig {
 
 bool Effect::within_time() const {
@@ -12,6 +14,14 @@ bool Effect::within_time() const {
 
 std::string Effect::cause() const {
   return name == "crosstalk" && !form.empty() ? name + " (" + form + ")" : name;
+}
+
+std::string Effect::label(int rotor, int from) const {
+  std::string text = name;
+  if (!form.empty()) text += " (" + form + ")";
+  if (from >= 0) text += fmt::format(" from rotor {}", from + 1);
+  if (rotor >= 0) text += fmt::format(" {} rotor {}", from >= 0 ? "to" : "of", rotor + 1);
+  return text;
 }
 
 std::vector<std::size_t> order_of_action(const std::vector<int>& stages) {

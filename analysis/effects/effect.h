@@ -88,6 +88,8 @@ struct Effect {
   bool has_change_point() const { return change_point().has_value(); }
   /// What it says the cause is: its name, whatever its form; of a table's other axes the axis as well.
   std::string cause() const;
+  /// "crosstalk from rotor 1 to rotor 2"; rotors from 0, −1: of all, from none.
+  std::string label(int rotor, int from = -1) const;
   std::optional<double> theory() const { return parameters[0].theory; }
   /// Where effects add forces, each acts on what those of the stages before have made: 0 the rotor and its
   /// air, 1 the cell, 2 what scales its reading, 3 what is added to that.

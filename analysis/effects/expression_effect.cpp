@@ -1,6 +1,6 @@
 #include "analysis/effects/expression_effect.h"
 
-#include "analysis/residual/expression.h"
+#include "analysis/expression.h"
 #include "datasets/csv.h"
 #include "datasets/error.h"
 #include "datasets/toml_keys.h"

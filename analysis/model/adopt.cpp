@@ -1,6 +1,6 @@
 #include "analysis/model/adopt.h"
 
-#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation/explanation_output.h"
 #include "datasets/error.h"
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "analysis/model/model_version.h"
-#include "analysis/residual/explanation.h"
+#include "analysis/residual/explanation/explanation.h"
 
 #include <optional>
 

@@ -1,7 +1,7 @@
 #include "analysis/model/apply_model.h"
 
-#include "analysis/residual/joint_fit.h"
-#include "analysis/residual/previous_run.h"
+#include "analysis/residual/likelihood/joint_fit.h"
+#include "analysis/residual/observations/previous_run.h"
 #include "datasets/error.h"
 
 #include <algorithm>

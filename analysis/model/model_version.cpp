@@ -1,6 +1,6 @@
 #include "analysis/model/model_version.h"
 
-#include "analysis/residual/observations.h"
+#include "analysis/residual/observations/observations.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -213,13 +213,7 @@ Eigen::MatrixXd covariance_of(const Reader& reader, Index size) {
 
 }  // namespace
 
-std::string ModelTerm::label() const {
-  std::string text = effect->name;
-  if (!effect->form.empty()) text += " (" + effect->form + ")";
-  if (other >= 0) text += fmt::format(" from rotor {}", other + 1);
-  if (rotor >= 0) text += fmt::format(" {} rotor {}", other >= 0 ? "to" : "of", rotor + 1);
-  return text;
-}
+std::string ModelTerm::label() const { return effect->label(rotor, other); }
 
 double ModelCurve::column(std::size_t k, double x) const {
   if (shape == CurveShape::kLevels) return level_column(levels, static_cast<int>(k) + 1, x) - centre[k];

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "analysis/effects/effect.h"
-#include "analysis/residual/curve_basis.h"
+#include "analysis/residual/likelihood/curve_basis.h"
 
 #include <limits>
 #include <optional>

@@ -11,7 +11,7 @@ namespace tunnelrig {
 /// texts.
 std::string render_report(std::string_view json);
 
-/// The same of an explanation; `json` is made by explanation_html (analysis/residual).
+/// The same of an explanation; `json` is made by explanation_html.
 std::string render_explanation(std::string_view json);
 
 }  // namespace tunnelrig

@@ -2,6 +2,7 @@
 
 #include "datasets/error.h"
 #include "flight/localisation/start_search.h"
+#include "flight/localisation/swept_beams.h"
 #include "flight/localisation/visible_walls.h"
 
 #include <algorithm>
@@ -20,29 +21,6 @@ constexpr int kMost_steps = 8;
 constexpr double kConverged_m = 2e-4;
 constexpr double kSame_place_m = 0.1;
 constexpr double kChance_sigma = 3;  // of what neighbours share by chance
-
-/// Points of the walls as scans from several places in the section see them.
-std::vector<SectionPoint> reference_points(const CrossSection& section, const MatcherSettings& settings) {
-  std::vector<SectionPoint> points;
-  const SectionPoint middle = (section.lowest() + section.highest()) / 2;
-  const SectionPoint reach = settings.vantage_spread * (section.highest() - section.lowest()) / 2;
-  for (int i = -2; i <= 2; ++i)
-    for (int j = -2; j <= 2; ++j) {
-      SectionPoint from = middle + reach.cwiseProduct(SectionPoint(i, j) / 2);
-      if (settings.vantage_spread == 0) from = {0, 0};
-      if (!section.contains(from)) continue;
-      for (std::size_t beam = 0; beam < settings.layout.beams; ++beam) {
-        const double angle = settings.layout.angle_rad(beam);
-        const SectionPoint direction(std::cos(angle), std::sin(angle));
-        const double range = section.ray(from, direction);
-        if (range < settings.most_range_m) points.emplace_back(from + range * direction);
-      }
-      if (settings.vantage_spread == 0) return points;
-    }
-  if (points.empty())
-    throw InputError::in("scan matcher", "no wall of the section is in sight of its middle");
-  return points;
-}
 
 Projection narrowed(const Eigen::Matrix2d& m) {
   return {static_cast<float>(m(0, 0)), static_cast<float>(m(0, 1)), static_cast<float>(m(1, 0)),
@@ -95,10 +73,8 @@ struct ScanMatcher::Work {
   Search search;
   VisibleWalls walls;
   const BeamKernels& kernels = beam_kernels();
-  BeamArray arrays[10];
-  Beams beams;
-  std::vector<Eigen::Vector2f> directions;  // in the scan plane, as laid out
-  double bent_beams = 0;                    // that a beam's direction is off its place in the layout, at most
+  SweptBeams swept;
+  const Beams& beams = swept.beams();
   Eigen::Matrix2d attitude = Eigen::Matrix2d::Identity();  // the projection that the IMU gives
   int returned = 0;                                        // beams with a return
   std::vector<float> sizes_m;                              // of residuals, where their median is needed
@@ -111,63 +87,8 @@ struct ScanMatcher::Work {
       : settings(the_settings),
         section(the_section),
         search(search_for(section, settings)),
-        walls(section, settings.layout) {
-    float** const into[] = {&beams.cosine, &beams.sine, &beams.range,  &beams.along_y, &beams.along_z,
-                            &beams.y,      &beams.z,    &beams.wall_y, &beams.wall_z,  &beams.inverse};
-    for (std::size_t i = 0; i < std::size(arrays); ++i) {
-      arrays[i].resize(settings.layout.beams);
-      *into[i] = arrays[i].data();
-    }
-    beams.count = settings.layout.beams;
-    beams.padded = arrays[0].padded();
-    for (std::size_t i = 0; i < beams.count; ++i) {
-      const double angle = settings.layout.angle_rad(i);
-      directions.emplace_back(static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)));
-    }
-    point_as_laid_out();
-  }
-
-  void point_as_laid_out() {
-    for (std::size_t i = 0; i < beams.count; ++i) {
-      beams.cosine[i] = directions[i].x();
-      beams.sine[i] = directions[i].y();
-    }
-    bent_beams = 0;
-  }
-
-  /// The beams as they would be from the middle of the sweep to the points that they met.
-  void straighten(const SweepMotion& motion) {
-    if (bent_beams > 0) point_as_laid_out();
-    const Eigen::Vector2f travel =
-        (attitude.inverse() * motion.velocity_m_s * motion.sweep_s).cast<float>();  // in the scan plane
-    const auto turn_rad = static_cast<float>(motion.roll_rate_rad_s * motion.sweep_s);
-    const auto bend_rad =
-        static_cast<float>(0.5 * motion.roll_acceleration_rad_s2 * motion.sweep_s * motion.sweep_s);
-    if (travel.isZero(0) && turn_rad == 0 && bend_rad == 0) return;
-    float nearest = static_cast<float>(settings.most_range_m);
-    const float each = 1 / static_cast<float>(beams.count - 1);
-    for (std::size_t i = 0; i < beams.count; ++i) {
-      if (!(beams.range[i] > 0)) continue;
-      nearest = std::min(nearest, beams.range[i]);
-      const float at = each * static_cast<float>(i) - 0.5F;
-      // sin and cos of so small an angle
-      const float sine = at * (turn_rad + at * bend_rad), cosine = 1 - 0.5F * sine * sine;
-      const Eigen::Vector2f& d = directions[i];
-      const Eigen::Vector2f end =
-          beams.range[i] * Eigen::Vector2f(cosine * d.x() - sine * d.y(), sine * d.x() + cosine * d.y()) +
-          at * travel;
-      const float range = end.norm();
-      // Nothing is left of a beam by a motion that cannot be.
-      const bool real = range >= static_cast<float>(settings.least_range_m) && std::isfinite(range);
-      beams.range[i] = real ? range : 0;
-      if (!real) continue;
-      beams.cosine[i] = end.x() / range;
-      beams.sine[i] = end.y() / range;
-    }
-    bent_beams = 0.5 *
-                 static_cast<double>(std::abs(turn_rad) + std::abs(bend_rad) + travel.norm() / nearest) /
-                 settings.layout.step_rad;
-  }
+        walls(section, settings.layout),
+        swept(settings.layout) {}
 
   int unknowns() const {
     if (settings.unknowns == Unknowns::position) return 2;
@@ -243,7 +164,7 @@ struct ScanMatcher::Work {
   double step(Fit& fit, double& gate_m, bool turned) {
     const Eigen::Matrix2d now = projection(fit.pose);
     if (turned) kernels.project(beams, narrowed(now));
-    walls.look(kernels, beams, now, fit.pose.position, bent_beams);
+    walls.look(kernels, beams, now, fit.pose.position, swept.bent_beams());
     FitSums sums;
     const int size = unknowns();
     kernels.fit(beams, narrowed(now), static_cast<float>(gate_m), static_cast<float>(settings.most_slope),
@@ -374,10 +295,6 @@ struct ScanMatcher::Work {
   }
 
   void take(const Scan& scan, const Attitude& imu, const SweepMotion& motion) {
-    if (scan.range_m.empty()) throw InputError::in("scan", "it is empty");
-    if (scan.range_m.size() != beams.count)
-      throw InputError::in("scan", "{} beams: the matcher was set up for {}", scan.range_m.size(),
-                           beams.count);
     if (!std::isfinite(imu.roll_rad) || !std::isfinite(imu.pitch_rad) || !std::isfinite(imu.yaw_rad))
       throw InputError::in("scan", "its attitude is not finite");
     if (!motion.velocity_m_s.allFinite() || !std::isfinite(motion.roll_rate_rad_s) ||
@@ -388,14 +305,9 @@ struct ScanMatcher::Work {
       throw InputError::in("scan",
                            "pitch {} and yaw {} rad turn the scan plane over 75° from the cross-section",
                            imu.pitch_rad, imu.yaw_rad);
-    returned = kernels.load(scan.range_m.data(), beams, static_cast<float>(settings.least_range_m),
-                            static_cast<float>(settings.most_range_m));
-    if (returned < 0) {
-      const auto wrong =
-          std::find_if(scan.range_m.begin(), scan.range_m.end(), [](float r) { return r != r; });
-      throw InputError::in("scan", "beam {} is not a number", wrong - scan.range_m.begin());
-    }
-    straighten(motion);
+    returned = swept.load(kernels, scan, settings.least_range_m, settings.most_range_m);
+    swept.straighten(motion, attitude.inverse() * motion.velocity_m_s, settings.least_range_m,
+                     settings.most_range_m);
   }
 
   void remember(const Fit& fit) {
@@ -408,7 +320,7 @@ struct ScanMatcher::Work {
   /// rotation.
   Eigen::Vector2d moved_per_roll_m() {
     if (matched_gate_m == 0) return {0, 0};
-    walls.look(kernels, beams, matched_projection, matched, bent_beams);
+    walls.look(kernels, beams, matched_projection, matched, swept.bent_beams());
     FitSums sums;
     kernels.fit(beams, narrowed(matched_projection), static_cast<float>(matched_gate_m),
                 static_cast<float>(settings.most_slope), 3, sums);

@@ -1,5 +1,7 @@
 #include "flight/localisation/start_search.h"
 
+#include "datasets/error.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -42,6 +44,28 @@ float rival(const HoughColumn& column, const BeamKernels& kernels, double from_m
 }
 
 }  // namespace
+
+std::vector<SectionPoint> reference_points(const CrossSection& section, const MatcherSettings& settings) {
+  std::vector<SectionPoint> points;
+  const SectionPoint middle = (section.lowest() + section.highest()) / 2;
+  const SectionPoint reach = settings.vantage_spread * (section.highest() - section.lowest()) / 2;
+  for (int i = -2; i <= 2; ++i)
+    for (int j = -2; j <= 2; ++j) {
+      SectionPoint from = middle + reach.cwiseProduct(SectionPoint(i, j) / 2);
+      if (settings.vantage_spread == 0) from = {0, 0};
+      if (!section.contains(from)) continue;
+      for (std::size_t beam = 0; beam < settings.layout.beams; ++beam) {
+        const double angle = settings.layout.angle_rad(beam);
+        const SectionPoint direction(std::cos(angle), std::sin(angle));
+        const double range = section.ray(from, direction);
+        if (range < settings.most_range_m) points.emplace_back(from + range * direction);
+      }
+      if (settings.vantage_spread == 0) return points;
+    }
+  if (points.empty())
+    throw InputError::in("scan matcher", "no wall of the section is in sight of its middle");
+  return points;
+}
 
 TwoColumnSearch::TwoColumnSearch(const CrossSection& section, std::span<const SectionPoint> reference,
                                  const MatcherSettings& settings)

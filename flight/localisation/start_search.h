@@ -20,6 +20,10 @@ struct Found {
   double rivalry = 0;  // height of the second highest maximum (of either column) as a share of the highest
 };
 
+/// Points of the walls as scans from several places in the section see them. Throws InputError where no wall
+/// is in sight of its middle.
+std::vector<SectionPoint> reference_points(const CrossSection& section, const MatcherSettings& settings);
+
 // `box`: positions that are searched, m.
 
 /// β = 0° and 90° alone (6.8): y and z are found apart from each other.

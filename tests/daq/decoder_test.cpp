@@ -1,5 +1,6 @@
 #include "daq/packet_decoder.h"
 #include "daq/packets.h"
+#include "support/seeds.h"
 
 #include <random>
 
@@ -32,9 +33,9 @@ TEST(Decoder, PiecesOfAnySizeGiveTheSamePackets) {
 }
 
 TEST(Decoder, FindsEveryWholePacketBetweenGarbage) {
-  const unsigned seed = std::random_device{}();
+  const std::uint64_t seed = test::seed();
   SCOPED_TRACE(seed);
-  std::mt19937 engine(seed);
+  std::mt19937_64 engine(seed);
   std::vector<std::byte> stream;
   std::uint64_t garbage = 0;
   for (std::uint64_t i = 0; i < 200; ++i) {

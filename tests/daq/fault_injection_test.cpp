@@ -5,6 +5,7 @@
 #include "daq/virtual_board.h"
 #include "datasets/error.h"
 #include "support/message_of.h"
+#include "support/seeds.h"
 
 #include <map>
 #include <random>
@@ -63,7 +64,7 @@ void expect_every_frame_in_its_place(const Logged& logged) {
 class Faulty : public testing::TestWithParam<const char*> {};
 
 TEST_P(Faulty, EveryFrameIsAccountedFor) {
-  const std::uint64_t seed = std::random_device{}();
+  const std::uint64_t seed = test::seed();
   SCOPED_TRACE(seed);
   const double duration_s = 60;
   const Logged logged = log_with(GetParam(), duration_s, seed);

@@ -1,5 +1,5 @@
 // What a schema asks for that cannot be had is refused, by file, line and key.
-#include "analysis/residual/observations.h"
+#include "analysis/residual/observations/observations.h"
 #include "support/message_of.h"
 #include "support/temporary_folder.h"
 

@@ -1,7 +1,7 @@
 // What is printed of a table is in the unit that it was converted to, and says so.
-#include "analysis/residual/explanation.h"
-#include "analysis/residual/explanation_output.h"
-#include "analysis/residual/observations.h"
+#include "analysis/residual/explanation/explanation.h"
+#include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/observations/observations.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Any text as an expression over columns, and its value where it is one.
-#include "analysis/residual/expression.h"
+#include "analysis/expression.h"
 
 #include "fuzz/input.h"
 

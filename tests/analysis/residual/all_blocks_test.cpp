@@ -1,6 +1,6 @@
 // The search done once more when the seal is open: what the open blocks are too few to show, and what they
 // named wrongly.
-#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

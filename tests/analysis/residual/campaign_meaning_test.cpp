@@ -1,7 +1,7 @@
 // What a campaign's runs mean for its observations: zeros that tares have taken, cells in volts, one rotor,
 // open space.
 #include "analysis/model/adopt.h"
-#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

@@ -1,7 +1,7 @@
 // Scatter that goes with a condition: what it is taken for, and what it no longer hides.
-#include "analysis/residual/condition_scatter.h"
+#include "analysis/residual/scatter/condition_scatter.h"
 
-#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

@@ -1,5 +1,5 @@
 // Curves beyond the range in which they were seen.
-#include "analysis/residual/curves.h"
+#include "analysis/residual/likelihood/curves.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

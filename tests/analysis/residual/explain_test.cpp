@@ -1,5 +1,5 @@
 // The protocol from end to end on simulated observations, and what is written of it.
-#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

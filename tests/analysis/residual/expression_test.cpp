@@ -1,4 +1,4 @@
-#include "analysis/residual/expression.h"
+#include "analysis/expression.h"
 
 #include "support/message_of.h"
 

@@ -1,6 +1,6 @@
 // What is beyond chance and gets no name all the same; what is said beside a name.
-#include "analysis/residual/explanation_output.h"
-#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/explanation/explanation_parts.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

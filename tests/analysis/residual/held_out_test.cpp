@@ -1,5 +1,5 @@
 // Prediction of runs that the fit did not see.
-#include "analysis/residual/held_out.h"
+#include "analysis/residual/likelihood/held_out.h"
 
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"

@@ -1,5 +1,5 @@
 // A condition that some rows lack is no candidate; what it does must not get another's name.
-#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/tables.h"
 
 #include <cmath>

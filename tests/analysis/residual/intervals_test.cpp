@@ -1,7 +1,7 @@
 // Intervals hold what they say they hold, over many simulated samples.
-#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/search/step_profile.h"
 #include "analysis/residual/simulated.h"
-#include "analysis/residual/step_profile.h"
 #include "support/seeds.h"
 
 #include <cmath>

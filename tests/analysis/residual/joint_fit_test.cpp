@@ -1,7 +1,7 @@
 // All parameters at once, on data whose truth is known.
-#include "analysis/residual/joint_fit.h"
+#include "analysis/residual/likelihood/joint_fit.h"
 
-#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/explanation/explanation_parts.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

@@ -1,8 +1,8 @@
 // Likelihood ratios against brute force on dense matrices.
-#include "analysis/residual/likelihood.h"
+#include "analysis/residual/likelihood/likelihood.h"
 
+#include "analysis/residual/likelihood/strata_fit.h"
 #include "analysis/residual/simulated.h"
-#include "analysis/residual/strata_fit.h"
 #include "calibration/distributions.h"
 #include "support/seeds.h"
 

@@ -1,7 +1,7 @@
 // The random part of the model against dense algebra.
-#include "analysis/residual/mixed_model.h"
+#include "analysis/residual/likelihood/mixed_model.h"
 
-#include "analysis/residual/run_correlation.h"
+#include "analysis/residual/scatter/run_correlation.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

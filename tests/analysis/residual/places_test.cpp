@@ -1,6 +1,6 @@
 // Conditions that do different things in different places of the tunnel.
-#include "analysis/residual/explanation_output.h"
-#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/explanation/explanation_parts.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

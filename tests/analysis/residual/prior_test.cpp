@@ -1,5 +1,5 @@
 // What decides between names that fit alike, and which form of a name is taken.
-#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/explanation/explanation_parts.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

@@ -1,5 +1,5 @@
 // Effects that add forces, one of which acts on what another has made.
-#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/tables.h"
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // What two conditions do together and neither does alone.
-#include "analysis/residual/explanation_output.h"
-#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/explanation/explanation_parts.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

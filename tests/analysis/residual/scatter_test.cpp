@@ -1,9 +1,10 @@
 // Scatter that is not the same everywhere: a rotor's own, and runs that belong to no scatter.
-#include "analysis/residual/contrast_scatter.h"
-#include "analysis/residual/explanation_output.h"
-#include "analysis/residual/explanation_parts.h"
-#include "analysis/residual/rotor_scatter.h"
-#include "analysis/residual/rotor_sessions.h"
+#include "analysis/report/explanation_page.h"
+#include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/scatter/contrast_scatter.h"
+#include "analysis/residual/scatter/rotor_scatter.h"
+#include "analysis/residual/scatter/rotor_sessions.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

@@ -1,4 +1,4 @@
-#include "analysis/residual/seal.h"
+#include "analysis/residual/explanation/seal.h"
 
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"

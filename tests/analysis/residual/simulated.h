@@ -2,8 +2,8 @@
 // model against.
 #pragma once
 
-#include "analysis/residual/explanation.h"
-#include "analysis/residual/mixed_model.h"
+#include "analysis/residual/explanation/explanation.h"
+#include "analysis/residual/likelihood/mixed_model.h"
 
 #include <random>
 #include <string>

@@ -1,5 +1,5 @@
 // False alarms, coverage and recovery over many simulated campaigns.
-#include "analysis/residual/attribution.h"
+#include "analysis/residual/search/attribution.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

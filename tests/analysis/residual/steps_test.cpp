@@ -1,7 +1,7 @@
 // Steps: where they are, and what is none.
-#include "analysis/residual/explanation_output.h"
-#include "analysis/residual/explanation_parts.h"
-#include "analysis/residual/step_profile.h"
+#include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/search/step_profile.h"
 #include "analysis/residual/tables.h"
 
 #include <gmock/gmock.h>

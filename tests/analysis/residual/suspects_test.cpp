@@ -1,6 +1,6 @@
 // Runs whose conditions were mistyped, and rows whose responses were.
-#include "analysis/residual/explanation_output.h"
-#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/explanation/explanation_parts.h"
 #include "analysis/residual/simulated.h"
 #include "analysis/residual/tables.h"
 #include "support/seeds.h"

@@ -1,5 +1,6 @@
 // Groups of a table: amplitudes and lines of their own, and what is the same in all rows of one.
-#include "analysis/residual/explanation_output.h"
+#include "analysis/report/explanation_page.h"
+#include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/tables.h"
 
 #include <array>

@@ -1,5 +1,5 @@
 // What a table's units, blocks and baseline mean for what is found in it.
-#include "analysis/residual/parts_of_equal_size.h"
+#include "analysis/residual/observations/parts_of_equal_size.h"
 #include "analysis/residual/tables.h"
 #include "support/message_of.h"
 

@@ -1,5 +1,5 @@
 // Which rows of a table are explained, and as what.
-#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/tables.h"
 #include "datasets/error.h"
 

@@ -1,7 +1,7 @@
 // Tables given as texts, for tests of what is found in them.
 #pragma once
 
-#include "analysis/residual/explanation_parts.h"
+#include "analysis/residual/explanation/explanation_parts.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

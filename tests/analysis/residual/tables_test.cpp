@@ -1,8 +1,8 @@
 // Tables as others bring them: gross rows, a cell's volts, groups that differ, steps and trends.
 #include "analysis/residual/tables.h"
 
-#include "analysis/residual/curves.h"
-#include "analysis/residual/explanation_output.h"
+#include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/likelihood/curves.h"
 #include "support/message_of.h"
 
 #include <cmath>

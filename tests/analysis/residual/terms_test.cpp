@@ -1,5 +1,6 @@
 // What a term does to runs, and which ways there are to try an effect.
-#include "analysis/residual/joint_fit.h"
+#include "analysis/residual/likelihood/candidates.h"
+#include "analysis/residual/likelihood/joint_fit.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 

@@ -1,0 +1,39 @@
+// Where a step lies.
+#include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/search/step_profile.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace tunnelrig {
+
+MeanModel with_change_points_of_all(const Observations& observations, MeanModel model,
+                                    std::vector<ChangePoint>& result) {
+  const std::vector<int> rows = observations.all_rows();
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    const auto k = model.terms[t].effect->change_point();
+    if (!k) continue;
+    const StepProfile profile = step_profile(observations, model, t, rows);
+    if (profile.empty()) continue;
+    model.terms[t].parameters[*k] = profile.likeliest();
+    result.push_back({t, *k, static_cast<double>(profile.lowest()), static_cast<double>(profile.highest())});
+  }
+  return model;
+}
+
+std::vector<int> astride_of_steps(const MeanModel& model, const Seal& seal) {
+  std::vector<int> astride;
+  for (const Term& term : model.terms) {
+    if (!term.effect->has_change_point()) continue;
+    const int behind = first_row_of(term);
+    const auto first = std::lower_bound(seal.open.begin(), seal.open.end(), behind);
+    const int last = first == seal.open.begin() ? -1 : *std::prev(first);
+    std::copy_if(seal.sealed.begin(), seal.sealed.end(), std::back_inserter(astride),
+                 [&](int row) { return row > last && row < behind; });
+  }
+  std::sort(astride.begin(), astride.end());
+  astride.erase(std::unique(astride.begin(), astride.end()), astride.end());
+  return astride.size() < seal.sealed.size() ? astride : std::vector<int>();
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,234 @@
+// Structure without a name, as a curve with its band.
+#include "analysis/residual/explanation/explanation_parts.h"
+#include "calibration/distributions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Where a curve is drawn, and its columns there.
+struct Drawn {
+  double x = 0;
+  VectorXd columns;
+};
+
+/// Of what a curve is over.
+struct Stretch {
+  double low, high;
+};
+
+/// Where the groups' ranges overlap. From one stretch to the next the groups' constants may have any
+/// difference: the curve is not known there.
+std::vector<Stretch> stretches_of(const Observations& observations, const std::vector<int>& rows,
+                                  const Curve& curve) {
+  const Stretch all{curve.x.minCoeff(), curve.x.maxCoeff()};
+  if (curve.strength || !curve.everywhere()) return {all};
+  std::vector<Stretch> of_groups;
+  for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
+    const MatrixXd x = curve.x(own, Eigen::all);
+    of_groups.push_back({x.minCoeff(), x.maxCoeff()});
+  }
+  std::sort(of_groups.begin(), of_groups.end(),
+            [](const Stretch& a, const Stretch& b) { return a.low < b.low; });
+  std::vector<Stretch> merged;
+  for (const Stretch& each : of_groups) {
+    if (merged.empty() || each.low > merged.back().high)
+      merged.push_back(each);
+    else
+      merged.back().high = std::max(merged.back().high, each.high);
+  }
+  std::erase_if(merged, [](const Stretch& each) { return each.low == each.high; });
+  return merged.empty() ? std::vector{all} : merged;
+}
+
+/// A curve is known but for a constant: it is drawn about its mean, and its band is of that.
+void centre(std::vector<Drawn>& points) {
+  VectorXd mean = VectorXd::Zero(points[0].columns.size());
+  for (const Drawn& point : points) mean += point.columns / static_cast<double>(points.size());
+  for (Drawn& point : points) point.columns -= mean;
+}
+
+std::vector<Drawn> drawn_levels(const Curve& curve) {
+  const auto k = static_cast<Index>(curve.columns.size());
+  std::vector<double> levels = curve.levels;
+  std::sort(levels.begin(), levels.end());
+  std::vector<Drawn> points;
+  for (const double x : levels) {
+    points.push_back({x, VectorXd(k)});
+    for (Index b = 0; b < k; ++b)
+      points.back().columns(b) = level_column(curve.levels, static_cast<int>(b) + 1, x);
+  }
+  return points;
+}
+
+/// From x = `from` to `to`, of a curve over `low` to `high`.
+std::vector<Drawn> drawn_curve(const Curve& curve, double from, double to, double low, double high) {
+  constexpr int kPoints = 25;
+  std::vector<Drawn> points;
+  for (int p = 0; p < kPoints; ++p) {
+    const double x = from + static_cast<double>(p) / (kPoints - 1) * (to - from);
+    points.push_back({x, VectorXd(static_cast<Index>(curve.columns.size()))});
+    for (std::size_t b = 0; b < curve.columns.size(); ++b)
+      points.back().columns(static_cast<Index>(b)) = tilted_column(curve.shape, curve.tilt, b, x, low, high);
+    if (curve.strength)  // it turns about the mean
+      points.back().columns.array() -= curve_straight(curve.shape, curve.x.mean(), low, high);
+  }
+  return points;
+}
+
+/// Of a smooth curve two columns more than its data asked for: what it then lacks is less than its band.
+Curve as_drawn(const Observations& observations, const Curve& curve, const std::vector<int>& rows) {
+  const std::vector<Curve> forms = smooth_forms(observations, curve, rows);
+  return forms.empty() ? curve : forms[std::min(curve.columns.size() + 1, forms.size() - 1)];
+}
+
+/// What is straight over a condition along which each group has a line (or a power law) of its own is that
+/// line's, of which the fit gives the curve a part or not: it is taken out of what is drawn.
+void take_out_baseline(const Observations& observations, const std::vector<int>& rows, const Curve& curve,
+                       std::vector<Drawn>& points) {
+  if (observations.slopes.cols() == 0 || curve.x.cols() != 1 || curve.strength) return;
+  const auto n = static_cast<Index>(rows.size()), k = static_cast<Index>(curve.columns.size());
+  const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
+  for (const CurveShape shape : {CurveShape::kStraight, CurveShape::kLogStraight}) {
+    if (is_of_logarithm(shape) && low <= 0) return;
+    const auto straight = [&](double x) { return Eigen::Vector2d(1, curve_straight(shape, x, low, high)); };
+    Eigen::MatrixX2d line(n, 2);
+    MatrixXd columns(n, k);
+    MatrixXd slopes(n, observations.slopes.cols());
+    for (Index r = 0; r < n; ++r) {
+      const int row = rows[static_cast<std::size_t>(r)];
+      const double x = curve.x(row, 0);
+      line.row(r) = straight(x).transpose();
+      slopes.row(r) = observations.slopes.row(row);
+      for (Index b = 0; b < k; ++b)
+        columns(r, b) =
+            tilted_column(curve.shape, curve.tilt, static_cast<std::size_t>(b), x, curve.low, curve.high);
+    }
+    const auto solver = line.colPivHouseholderQr();
+    const MatrixXd bent = slopes - line * solver.solve(slopes);
+    const MatrixXd centred = slopes.rowwise() - slopes.colwise().mean();
+    if ((bent.colwise().norm().array() > 1e-6 * centred.colwise().norm().array()).all())
+      continue;  // the groups' lines are over something else
+    const MatrixXd taken = solver.solve(columns);
+    for (Drawn& point : points) point.columns -= taken.transpose() * straight(point.x);
+    return;
+  }
+}
+
+/// The column of the runs sheet that a condition is made of: its own name where it is made of raw data or of
+/// the order.
+std::string column_behind(const std::string& derived) {
+  if (derived == "hours_in_session" || derived == "hour_of_day") return "start_utc";
+  if (derived == "air_temperature_rate_K_s") return "air_temperature_C";
+  return derived;
+}
+
+}  // namespace
+
+UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
+                          const std::vector<int>& rows) {
+  UnknownStructure result{.covariate = found.curve.covariate,
+                          .condition = found.curve.covariate,
+                          .covariate_unit = {},
+                          .place = found.curve.in_place(),
+                          .times = found.curve.times(),
+                          .rotor = found.curve.rotor,
+                          .p_value = found.p,
+                          .shape = {},
+                          .levels = found.curve.shape == CurveShape::kLevels,
+                          .labels = found.curve.labels,
+                          .instead_of = found.instead_of,
+                          .could_be = found.could_be};
+  if (const Covariate* covariate = observations.find(result.condition)) {
+    result.covariate_unit = covariate->unit;
+    if (covariate->derived) result.covariate = column_behind(covariate->name);
+  }
+  const Curve curve = as_drawn(observations, found.curve, rows);
+  std::vector<Components> columns = fit.linear.columns;
+  auto last = columns.end();
+  for (auto other = fit.model.curves.rbegin(); !other->is_like(found.curve); ++other)
+    last -= static_cast<std::ptrdiff_t>(other->columns.size());
+  columns.erase(last - static_cast<std::ptrdiff_t>(found.curve.columns.size()), last);
+  columns.insert(columns.end(), curve.columns.begin(), curve.columns.end());
+  const Components y = difference(response_components(observations), fit.linear.offset);
+  const AmplitudeFit amplitudes = fit_amplitudes(observations, y, columns, fit.variances, rows);
+  const auto k = static_cast<Index>(curve.columns.size());
+  const VectorXd amplitude = amplitudes.amplitude.tail(k);
+  const MatrixXd covariance = amplitudes.covariance.bottomRightCorner(k, k);
+  const double scale = observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
+  const bool within = found.curve.x.size() == 0;
+  const double duration_s = observations.duration_s.maxCoeff();
+  std::vector<std::vector<Drawn>> pieces;
+  if (result.levels)
+    pieces.push_back(drawn_levels(curve));
+  else if (within)
+    pieces.push_back(drawn_curve(curve, 0, duration_s, 0, duration_s));
+  else
+    for (const Stretch& stretch : stretches_of(observations, rows, curve))
+      pieces.push_back(drawn_curve(curve, stretch.low, stretch.high, curve.low, curve.high));
+  for (std::vector<Drawn>& points : pieces) {
+    if (!result.levels) take_out_baseline(observations, rows, curve, points);
+    if (!curve.strength) centre(points);
+    double lowest = 1e300, highest = -1e300;
+    for (const Drawn& point : points) {
+      const double value = scale * point.columns.dot(amplitude);
+      const double half =
+          1.96 * scale * std::sqrt(std::max(0.0, point.columns.dot(covariance * point.columns)));
+      result.shape.push_back({point.x, value, value - half, value + half});
+      lowest = std::min(lowest, value);
+      highest = std::max(highest, value);
+    }
+    result.amplitude = std::max(result.amplitude, (highest - lowest) / 2);
+  }
+  return result;
+}
+
+UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual, int rotor,
+                                   const std::vector<int>& rows) {
+  UnknownStructure result{.covariate = "session",
+                          .condition = "session",
+                          .covariate_unit = {},
+                          .place = {},
+                          .times = {},
+                          .rotor = rotor,
+                          .p_value = 0.025,
+                          .shape = {},
+                          .labels = {},
+                          .instead_of = {}};
+  std::map<int, std::vector<double>> offsets;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const auto run = residual.row(static_cast<Index>(r));
+    const double mean = rotor < 0 ? -run.mean() : -run(rotor);
+    if (!std::isnan(mean)) offsets[observations.block[static_cast<std::size_t>(rows[r])]].push_back(mean);
+  }
+  const auto mean_of = [](const std::vector<double>& values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  };
+  double squares = 0, free = 0;  // of all sessions' runs: one may have a single run
+  for (const auto& [block, values] : offsets) {
+    for (const double value : values) squares += std::pow(value - mean_of(values), 2);
+    free += static_cast<double>(values.size()) - 1;
+  }
+  free = std::max(1.0, free);
+  double lowest = 1e300, highest = -1e300;
+  for (const auto& [block, values] : offsets) {
+    const double mean = mean_of(values);
+    const double half = half_width_95(std::sqrt(squares / free / static_cast<double>(values.size())), free);
+    result.shape.push_back({static_cast<double>(block + 1), mean, mean - half, mean + half});
+    lowest = std::min(lowest, mean);
+    highest = std::max(highest, mean);
+  }
+  result.amplitude = (highest - lowest) / 2;
+  return result;
+}
+
+}  // namespace tunnelrig

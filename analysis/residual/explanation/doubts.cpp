@@ -1,0 +1,245 @@
+// What speaks against an explanation that was found: the opened seal, the intervals, readings that scatter,
+// rows that are alike.
+#include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/scatter/run_correlation.h"
+#include "datasets/first_few.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+void warn_of_bounds(const Observations& observations, const Attribution& found, Explanation& explanation) {
+  std::set<std::string> said;  // of each effect once
+  for (const Accepted& accepted : found.accepted) said.insert(accepted.term.effect->name);
+  for (const BeyondBounds& beyond : found.beyond_bounds) {
+    const Effect& effect = *beyond.term.effect;
+    if (!said.insert(effect.name).second) continue;
+    const EffectParameter& amplitude = effect.parameters[0];
+    const std::string own = unit_of(observations, amplitude), unit = own == "1" ? "" : " " + own;
+    explanation.warnings.push_back(fmt::format(
+        "of all candidates {} fitted best by far, but its {} would be {:.3g}{}, and its physical bounds are "
+        "{:.3g} to {:.3g}{}: it is not named, and what is found beside it may be its work",
+        beyond.term.label(), amplitude.name, beyond.amplitude, unit, amplitude.lower, amplitude.upper, unit));
+  }
+}
+
+/// What the opened seal and the intervals say against what was adopted.
+void warn_of_doubts(Explanation& explanation) {
+  for (const AdoptedEffect& adopted : explanation.adopted) {
+    for (const ParameterEstimate& parameter : adopted.parameters)
+      if (parameter.theory && (parameter.value < parameter.low || parameter.value > parameter.high))
+        explanation.warnings.push_back(fmt::format(
+            "{}: its {} is theory's {:.4g}, and the data alone say {:.4g} to {:.4g}: something else goes "
+            "with it",
+            adopted.term.label(), parameter.name, parameter.value, parameter.low, parameter.high));
+    const ParameterEstimate& amplitude = adopted.parameters[0];
+    const std::optional<double> theory = adopted.term.effect->theory();
+    if (theory && !amplitude.theory && !adopted.term.per_group &&
+        (*theory < amplitude.low || *theory > amplitude.high))
+      explanation.warnings.push_back(
+          fmt::format("{}: its {} is {:.4g} to {:.4g}, and theory says {:.4g}: something else goes with it",
+                      adopted.term.label(), amplitude.name, amplitude.low, amplitude.high, *theory));
+  }
+  if (explanation.noise_floor > explanation.after.held_out_high)
+    explanation.warnings.emplace_back(
+        "the noise floor is above all of the error's interval: the rows scatter less evenly than its "
+        "variances "
+        "can follow (or the sealed blocks are calm by chance), so that it is too high");
+  const bool worse = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
+  if (const SealedErrors& sealed = explanation.sealed;
+      worse && sealed.all < std::min(sealed.curves, explanation.before.held_out_rmse))
+    explanation.warnings.push_back(
+        fmt::format("on the sealed blocks the error is larger with the names alone than without; beside the "
+                    "curves they make it smaller ({:.4g}, without them {:.4g}): adopt them together "
+                    "(--adopt-empirical)",
+                    sealed.all, sealed.curves));
+  else if (explanation.sealed.beyond_floor)
+    explanation.warnings.push_back(
+        fmt::format("on the sealed blocks the error with all that was found is {:.2g} times the noise floor: "
+                    "something else varies there",
+                    explanation.sealed.all / explanation.noise_floor));
+  else if (worse && explanation.sealed.against_adopted)
+    explanation.warnings.emplace_back(
+        "on the sealed blocks the error is larger with what was adopted than without: doubt it");
+  else if (worse)
+    explanation.warnings.emplace_back(
+        "on the sealed blocks what was adopted does little: that the error is larger with it than without is "
+        "chance, and says neither that it is right nor that it is wrong");
+}
+
+void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
+                         Explanation& explanation) {
+  constexpr double kInstrument = 0.01, kCommon = 0.003;  // of the speed: none scatters more; many do
+  const Covariate* speed = observations.find("speed_rpm");
+  if (speed == nullptr || observations.from_table || speed->value.array().isNaN().any()) return;
+  const Eigen::ArrayXd log_speed = speed->value.col(0).array().log() - speed->value.array().log().mean();
+  for (AdoptedEffect& adopted : explanation.adopted) {
+    const auto& names = adopted.term.effect->covariates;
+    if (adopted.term.effect->name == "rotor_speed" ||
+        std::find(names.begin(), names.end(), "speed_rpm") == names.end())
+      continue;
+    const Index channel = std::max(adopted.term.rotor, 0);
+    const Eigen::ArrayXd change =
+        respond(adopted.term, observations, predicted).value[0].col(channel).array();
+    const double exponent = ((change - change.mean()) * log_speed).sum() / log_speed.square().sum();
+    const double share = -exponent / 2;  // of the readings' variance, which is scatter then
+    const double scatter_rpm =
+        std::sqrt(std::max(0.0, share) * (speed->value.array() - speed->value.mean()).square().mean());
+    if (share <= 0 || scatter_rpm > kInstrument * speed->value.mean()) continue;
+    explanation.warnings.push_back(fmt::format(
+        "{}: readings of speed_rpm that scatter by {:.2g} rev/min would look the same, since they make "
+        "the thrust depend less on what is read; speeds further apart would tell",
+        adopted.term.label(), scatter_rpm));
+    if (scatter_rpm < kCommon * speed->value.mean())
+      adopted.confounded_with.emplace_back("scatter of speed_rpm");
+  }
+}
+
+namespace {
+
+/// The constant of thrusts beside their C_T, by rows that scatter as they were found to, and its standard
+/// error.
+struct Tare {
+  double value_N = 0, standard_error_N = 0;
+};
+Tare tare_of(const Observations& observations, const VectorXd& thrust_N, const std::vector<int>& rows) {
+  const VectorXd weight = observations.scatter.of_runs(rows).cwiseInverse();
+  Eigen::MatrixXd columns(thrust_N(rows).size(), 2);
+  columns << Eigen::MatrixXd::Ones(columns.rows(), 1), observations.slopes(rows, 0);
+  columns = weight.asDiagonal() * columns;
+  const VectorXd y = weight.asDiagonal() * VectorXd(thrust_N(rows));
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
+  if (qr.rank() < 2) return {};
+  const Eigen::Vector2d fitted = qr.solve(y);
+  const double variance = (y - columns * fitted).squaredNorm() / static_cast<double>(y.size() - 2);
+  const Eigen::Matrix2d inverse = (columns.transpose() * columns).inverse();
+  return {fitted(0), std::sqrt(variance * inverse(0, 0))};
+}
+
+/// Whether most rows have the value of the row before them.
+bool is_shared_by_neighbours(const Covariate& covariate) {
+  Index shared = 0;
+  for (Index r = 1; r < covariate.value.rows(); ++r)
+    if (covariate.value(r, 0) == covariate.value(r - 1, 0)) ++shared;
+  return 2 * shared > covariate.value.rows() && shared + 1 < covariate.value.rows();
+}
+
+/// Days whose rows have one weather: what goes with the weather has as many independent values as there are
+/// days.
+void warn_of_shared_conditions(const Observations& observations, Explanation& explanation) {
+  std::set<std::string> names;
+  for (const AdoptedEffect& adopted : explanation.adopted)
+    names.insert(adopted.term.effect->covariates.begin(), adopted.term.effect->covariates.end());
+  for (const UnknownStructure& unknown : explanation.unknown) names.insert(unknown.condition);
+  for (const std::string& name : names)
+    if (const Covariate* covariate = observations.find(name);
+        covariate != nullptr && is_shared_by_neighbours(*covariate))
+      explanation.warnings.push_back(fmt::format(
+          "neighbouring rows share their {}, and are taken as independent: if they belong together (a day, a "
+          "set-up), give them a block (blocks = a column), or names and p may be wrong",
+          name));
+}
+
+/// Correlation of two columns beside the baseline; of one rotor, or of all.
+double correlation_beside(const MixedModel& baseline, const Components& a, const Components& b) {
+  double ab = 0, aa = 0, bb = 0;
+  for (std::size_t s = 0; s < baseline.strata().size(); ++s) {
+    if (!baseline.strata()[s].means()) continue;
+    Stacked both = baseline.stack(s, {&a, &b});
+    baseline.project(s, 0, both);
+    ab += both.col(0).dot(both.col(1));
+    aa += both.col(0).squaredNorm();
+    bb += both.col(1).squaredNorm();
+  }
+  return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0;
+}
+
+/// Conditions that no effect is known to follow: what they may do has no name to be confounded with.
+std::vector<const Covariate*> without_effects(const Observations& observations,
+                                              const std::vector<const Effect*>& effects) {
+  std::set<std::string> named;
+  for (const Effect* effect : effects) named.insert(effect->covariates.begin(), effect->covariates.end());
+  std::vector<const Covariate*> result;
+  for (const Covariate& covariate : observations.covariates)
+    if (!covariate.derived && !covariate.per_channel() && covariate.labels.empty() &&
+        covariate.value.allFinite() && !named.contains(covariate.name))
+      result.push_back(&covariate);
+  return result;
+}
+
+}  // namespace
+
+void warn_of_companions(const Observations& observations, const std::vector<const Effect*>& effects,
+                        Explanation& explanation) {
+  constexpr double kTold = 3;        // standard errors
+  constexpr double kTogether = 0.7;  // half of the one's variance is the other's
+  const std::vector<const Covariate*> others = without_effects(observations, effects);
+  if (others.empty()) return;
+  const std::vector<int> rows = observations.all_rows();
+  const MixedModel baseline = MixedModel::baseline_alone(observations, rows);
+  const Forces forces = predict_forces(observations, explanation.model, rows);
+  for (std::size_t t = 0; t < explanation.adopted.size(); ++t) {
+    const AdoptedEffect& adopted = explanation.adopted[t];
+    const ParameterEstimate& amplitude = adopted.parameters[0];
+    if (adopted.term.per_group || amplitude.theory || !(amplitude.standard_error > 0)) continue;
+    const Components own = respond(adopted.term, observations, forces.acted_on[t]).value;
+    for (const Covariate* other : others) {
+      Components column(own.size(), Eigen::MatrixXd::Zero(observations.rows(), observations.channels()));
+      for (Index c = 0; c < observations.channels(); ++c)
+        if (adopted.term.rotor < 0 || c == adopted.term.rotor) column[0].col(c) = other->value.col(0);
+      const double together = correlation_beside(baseline, own, column);
+      const double told = amplitude.value / amplitude.standard_error * std::sqrt(1 - together * together);
+      if (std::abs(together) < kTogether || std::abs(told) > kTold) continue;
+      explanation.warnings.push_back(
+          fmt::format("{} and {} go together here (correlation {:.2f}): what {} does may be the work of {}",
+                      adopted.term.label(), other->name, together, adopted.term.label(), other->name));
+    }
+  }
+}
+
+void warn_of_tares(const Observations& observations, const MeanModel& model, Explanation& explanation) {
+  constexpr double kClear = 4;
+  constexpr std::size_t kFewest = 5, kNamed = 4;
+  const bool constant_beside_c_t =
+      observations.coefficient && !observations.multiplicative && observations.slopes.cols() == 1;
+  if (!constant_beside_c_t || observations.baseline != "constant") return;
+  const std::vector<int> all = observations.all_rows();
+  const Forces forces = predict_forces(observations, model, all);
+  const VectorXd thrust_N = (observations.y - linearise(observations, model, forces).offset[0]).col(0);
+  std::vector<std::string> tares;
+  for (const auto& [group, rows] : rows_of_each(observations.group, all)) {
+    if (rows.size() < kFewest) continue;
+    const Tare tare = tare_of(observations, thrust_N, rows);
+    if (std::abs(tare.value_N) <= kClear * tare.standard_error_N) continue;
+    const std::string& name = observations.group_name[static_cast<std::size_t>(group)];
+    tares.push_back(fmt::format("{}{:.3g} ± {:.2g} {}", observations.groups() > 1 ? name + " " : "",
+                                tare.value_N, tare.standard_error_N, observations.unit));
+  }
+  if (tares.empty()) return;
+  explanation.warnings.push_back(
+      fmt::format("the baseline has a constant beside C_T, {}: a tare that was not taken off?",
+                  first_few(tares, kNamed)));
+}
+
+void warn_of_alike_rows(const Observations& observations, Explanation& explanation) {
+  if (!observations.blocks_are_rows) return;
+  warn_of_shared_conditions(observations, explanation);
+  VectorXd residual = explanation.residual_after.col(0);
+  if (observations.multiplicative) residual = residual.array() / observations.value.col(0).array();
+  const double correlation = row_correlation(observations, observations.all_rows(), residual);
+  if (correlation == 0) return;
+  explanation.warnings.push_back(fmt::format(
+      "rows resemble the row before them (correlation {:.2f}) and are taken as independent: names and "
+      "p may be wrong; rows that belong together want a block of their own (blocks = a column, or "
+      "bins(column, n))",
+      correlation));
+}
+
+}  // namespace tunnelrig

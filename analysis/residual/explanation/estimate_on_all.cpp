@@ -1,0 +1,107 @@
+// Once the seal is open: what all runs say of what was found.
+#include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/likelihood/scores.h"
+
+namespace tunnelrig {
+namespace {
+
+void report_adopted(const Observations& observations, const Attribution& found, const JointFit& whole,
+                    const std::vector<int>& rows, Explanation& explanation) {
+  const auto parameters = estimate_parameters(observations, whole, rows);
+  for (std::size_t t = 0; t < found.accepted.size(); ++t) {
+    const Accepted& accepted = found.accepted[t];
+    AdoptedEffect adopted{.term = whole.model.terms[t],
+                          .parameters = parameters[t],
+                          .p_value = accepted.p,
+                          .held_out_gain = accepted.gain,
+                          .at_bound = at_bound(whole, accepted.term),
+                          .confounded_with = {},
+                          .separating_run = {}};
+    if (adopted.term.per_group)
+      adopted.parameters[0] =
+          summary_of_groups(adopted.term.effect->parameters[0],
+                            estimate_by_group(observations, whole.model, t, whole.variances, rows));
+    for (std::size_t k = 0; k < adopted.parameters.size(); ++k)
+      adopted.parameters[k].unit = unit_of(observations, adopted.term.effect->parameters[k]);
+    for (const Ranked& rival : accepted.confounded)
+      adopted.confounded_with.push_back(rival.term.effect->cause());
+    if (!accepted.confounded.empty())
+      adopted.separating_run =
+          separating_run(observations, found.final, t, accepted.confounded[0].term, rows);
+    explanation.adopted.push_back(std::move(adopted));
+  }
+}
+
+/// Change-points as the runs are numbered, where the search counted rows.
+void number_change_points(const Observations& observations, const std::vector<ChangePoint>& change_points,
+                          Explanation& explanation) {
+  const Covariate* order = observations.find("run_order");
+  if (order == nullptr) return;
+  for (const ChangePoint& point : change_points) {
+    ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
+    for (double* place : {&estimate.value, &estimate.low, &estimate.high})
+      *place = order->value(static_cast<Eigen::Index>(*place), 0);
+  }
+}
+
+/// Names are settled, but a structure that the open blocks are too few for is one all the same.
+void report_structure_left(const StructureLeft& left, const Observations& observations,
+                           const std::vector<int>& rows, Explanation& explanation) {
+  for (const std::size_t t : left.bent) explanation.adopted[t].bends_away = true;
+  for (const FoundCurve& curve : left.curves) {
+    explanation.unknown.push_back(describe(observations, left.fit, curve, rows));
+    explanation.unknown.back().by_sealed_too = true;
+    explanation.by_sealed_too.push_back(curve.curve);
+  }
+  for (Round round : left.rounds) {
+    round.outcome = "all blocks, the sealed ones too: " + round.outcome;
+    explanation.curve_rounds.push_back(std::move(round));
+  }
+}
+
+}  // namespace
+
+void estimate_on_all(const Models& models, const Observations& observations,
+                     const std::vector<const Effect*>& effects, const SearchSettings& settings,
+                     Explanation& explanation) {
+  const auto& [wide, alone, baseline, found] = models;
+  const std::vector<int> rows = observations.all_rows();
+  std::vector<ChangePoint> change_points;
+  const JointFit whole =
+      fit_jointly(wide, with_change_points_of_all(wide, found.final.model, change_points), rows);
+  if (!whole.converged)
+    explanation.warnings.emplace_back(
+        "the effects could not be fitted together to all runs, since forces would change their sign: the "
+        "parameters are those that the search had");
+  explanation.model = whole.model;
+  explanation.scatter = wide.scatter;
+  explanation.residual_before = residuals(baseline.data, fit_jointly(baseline.data, {}, rows), rows);
+  const HeldOutErrors fitted = score(wide, whole, rows, rows);
+  explanation.residual_after = fitted.error;
+  report_adopted(wide, found, whole, rows, explanation);
+  for (const ChangePoint& point : change_points) {
+    ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
+    estimate.low = point.low;
+    estimate.high = point.high;
+    estimate.run = observations.name[static_cast<std::size_t>(estimate.value)];
+    constexpr double kMostOfTheCourse = 0.5;
+    explanation.adopted[point.term].anywhere |=
+        point.high - point.low > kMostOfTheCourse * static_cast<double>(rows.size());
+  }
+  warn_of_doubts(explanation);
+  warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);
+  for (const FoundCurve& curve : found.curves)
+    explanation.unknown.push_back(describe(wide, whole, curve, rows));
+  report_structure_left(structure_left(found, whole, rows, effects, settings), wide, rows, explanation);
+  if (found.session_unknown && explanation.unknown.empty())
+    explanation.unknown.push_back(
+        describe_sessions(observations, fitted.error, *found.session_unknown, rows));
+  explanation.suspect_rows =
+      suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
+  warn_of_alike_rows(observations, explanation);
+  warn_of_tares(wide, whole.model, explanation);
+  warn_of_changes_at_steps(observations, explanation);
+  number_change_points(observations, change_points, explanation);
+}
+
+}  // namespace tunnelrig

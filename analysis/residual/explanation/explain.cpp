@@ -1,0 +1,232 @@
+// The protocol done again without what it showed to be wrong: gross rows, names that the seal refutes.
+#include "analysis/residual/explanation/explanation_parts.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace tunnelrig {
+namespace {
+
+constexpr std::size_t kRunsPerGross = 25;  // what touches more runs of a campaign is no slip of the hand
+constexpr int kMostSearches = 2;           // after the first, each without the gross rows of the one before
+
+std::vector<int> rows_but(const Observations& observations, const std::vector<SuspectRow>& left_out) {
+  std::vector<int> rows;
+  for (int r = 0; r < static_cast<int>(observations.rows()); ++r)
+    if (std::none_of(left_out.begin(), left_out.end(), [&](const SuspectRow& row) {
+          return row.row == observations.name[static_cast<std::size_t>(r)];
+        }))
+      rows.push_back(r);
+  return rows;
+}
+
+/// What is left of the rows, and what is not.
+struct SetAside {
+  Observations kept;
+  std::size_t most;
+  std::vector<SuspectRow> rows;
+
+  explicit SetAside(const Observations& all)
+      : kept(all), most(all.name.size() / (all.from_table ? kRowsPerGross : kRunsPerGross)) {}
+  std::size_t room() const { return most - std::min(most, rows.size()); }
+  void take(const std::vector<SuspectRow>& gross) {
+    kept = kept.subset(rows_but(kept, gross));
+    for (SuspectRow row : gross) {
+      row.set_aside = true;
+      rows.push_back(row);
+    }
+  }
+};
+
+std::string in_words(const IsolatedValue& value, const char* what) {
+  return fmt::format("{} of {} is {:.6g}, far from all others ({:.6g} to {:.6g}): {}", value.covariate,
+                     value.row, value.value, value.low, value.high, what);
+}
+
+std::vector<SuspectRow> rows_of(const std::vector<IsolatedValue>& values) {
+  std::vector<SuspectRow> rows;
+  for (const IsolatedValue& value : values)
+    if (std::none_of(rows.begin(), rows.end(), [&](const SuspectRow& row) { return row.row == value.row; }))
+      rows.push_back({value.row, 0});
+  return rows;
+}
+
+/// A campaign's runs are many, and its conditions are typed by hand: one that is a slip goes with its run.
+void set_mistyped_aside(SetAside& aside, std::vector<std::string>& said) {
+  const std::vector<IsolatedValue> values = mistyped_values(aside.kept);
+  const std::vector<SuspectRow> rows = rows_of(values);
+  const bool few = rows.size() <= aside.room();
+  if (few) aside.take(rows);
+  for (const IsolatedValue& value : values)
+    said.push_back(in_words(value, few ? "set aside; a typing error?" : "a typing error?"));
+}
+
+/// A condition far from all others is said. Where the model found with such rows predicts worse than none, it
+/// is found without them.
+Explanation without_isolated(Explanation explanation, SetAside& aside,
+                             const std::vector<const Effect*>& effects, const SearchSettings& settings,
+                             std::vector<std::string>& said) {
+  const std::vector<IsolatedValue> isolated = isolated_values(aside.kept);
+  if (isolated.empty()) return explanation;
+  const bool misled = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
+  const std::vector<SuspectRow> rows = rows_of(isolated);
+  const bool aside_too = misled && rows.size() <= aside.room();
+  if (aside_too) {
+    aside.take(rows);
+    explanation = explain_once(aside.kept, effects, settings);
+  }
+  for (const IsolatedValue& value : isolated)
+    said.push_back(in_words(value, aside_too
+                                       ? "set aside, since the model found with it predicted worse than none"
+                                       : "a typing error?"));
+  return explanation;
+}
+
+/// What all runs say against a name that the open ones had let in; empty: nothing. Theory's coefficient is
+/// not the data's to refute.
+std::string refutation(const AdoptedEffect& adopted, const Observations& observations) {
+  if (adopted.term.effect->theory_only || adopted.term.at_theory) return "";
+  const ParameterEstimate& amplitude = adopted.parameters[0];
+  if (adopted.at_bound) return fmt::format("its {} is at its physical bound", amplitude.name);
+  if (adopted.anywhere) return "when it happened is not known within half of the runs";
+  if (adopted.bends_away)
+    return fmt::format("what goes with {} bends away from its formula",
+                       fmt::join(own_conditions(*adopted.term.effect, observations), ", "));
+  const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
+  // Where groups have their own, these may be of either sign, and nothing on the whole.
+  const bool nothing =
+      adopted.term.per_group ? std::ranges::all_of(amplitude.groups, holds_0) : holds_0(amplitude);
+  return nothing ? fmt::format("the 95 % interval of its {} holds 0", amplitude.name) : "";
+}
+
+/// Of two errors of the sealed blocks: by more than chance may do.
+bool worse(double error, double than) { return error > 1.1 * than; }
+
+/// What the opened seal refutes: single names, or all of them, since which is wrong is not known, and another
+/// for the same would be chosen by the seal.
+struct Refuted {
+  std::vector<Term> terms;
+  std::vector<std::string> why;  // of each of `terms`
+  bool at_bound = false;         // one of them
+  bool structure = false;        // of one of them the data have, in another shape
+  bool all = false;
+  bool any() const { return all || !terms.empty(); }
+};
+
+bool curves_do_better(const Explanation& explanation) {
+  return worse(explanation.sealed.all, explanation.sealed.curves) && explanation.sealed.against_names;
+}
+
+/// Better than the names, whether what else was found is in or not.
+bool baseline_does_better(const Explanation& explanation) {
+  return worse(explanation.sealed.all, explanation.before.held_out_rmse) &&
+         worse(explanation.sealed.names, explanation.before.held_out_rmse) &&
+         explanation.sealed.against_adopted;
+}
+
+Refuted refuted(const Explanation& explanation, const Observations& observations) {
+  Refuted result;
+  bool refutable = false;
+  for (const AdoptedEffect& adopted : explanation.adopted) {
+    refutable = refutable || !adopted.term.effect->theory_only;
+    const std::string why = refutation(adopted, observations);
+    if (why.empty()) continue;
+    result.terms.push_back(adopted.term);
+    result.why.push_back(why);
+    result.at_bound |= adopted.at_bound;
+    result.structure |= adopted.bends_away || adopted.anywhere;
+  }
+  result.all = result.terms.empty() && refutable &&
+               (curves_do_better(explanation) || baseline_does_better(explanation));
+  return result;
+}
+
+std::string taken_back_all(const Explanation& explanation) {
+  std::vector<std::string> names;
+  for (const AdoptedEffect& adopted : explanation.adopted)
+    if (!adopted.term.effect->theory_only) names.push_back(adopted.term.label());
+  return fmt::format(
+      "{} found and taken back: the error of the sealed blocks is {:.4g}{} with {}, {:.4g} without",
+      fmt::join(names, ", "), explanation.sealed.all, explanation.unit_suffix(),
+      names.size() > 1 ? "them" : "it",
+      curves_do_better(explanation) ? explanation.sealed.curves : explanation.before.held_out_rmse);
+}
+
+/// Once more without the names that are refuted: what they did may be structure whose cause is not known.
+/// Where the names predict the sealed blocks, and what is found without them does not, they stay. What may
+/// not be found any more is out of `effects` and `settings` then.
+Explanation without_refuted(Explanation explanation, const Observations& observations,
+                            std::vector<const Effect*>& effects, SearchSettings& settings,
+                            std::vector<std::string>& said) {
+  for (Refuted found = refuted(explanation, observations); found.any();
+       found = refuted(explanation, observations)) {
+    std::vector<const Effect*> fewer = effects;
+    SearchSettings stricter = settings;
+    stricter.taken_back.insert(stricter.taken_back.end(), found.terms.begin(), found.terms.end());
+    if (found.all) std::erase_if(fewer, [](const Effect* effect) { return !effect->theory_only; });
+    Explanation without = explain_once(observations, fewer, stricter);
+    without.untestable = explanation.untestable;
+    // What bends away from a formula, or is no step, is structure, and predicts as such.
+    const double without_them = found.structure ? without.sealed.all : without.sealed.names;
+    const bool stay = !found.at_bound && worse(explanation.sealed.curves, explanation.sealed.all) &&
+                      worse(without_them, explanation.sealed.all);
+    if (found.all) said.push_back(taken_back_all(explanation));
+    for (std::size_t k = 0; k < found.terms.size(); ++k)
+      said.push_back(
+          found.terms[k].label() +
+          (stay ? " stays, since the sealed blocks are predicted worse without it, though with them in, "
+                : " was found and is taken back: with the sealed blocks in, ") +
+          found.why[k]);
+    if (stay) break;
+    explanation = std::move(without);
+    effects = std::move(fewer);
+    settings = std::move(stricter);
+  }
+  return explanation;
+}
+
+}  // namespace
+
+Observations without_set_aside(const Observations& observations, const Explanation& explanation) {
+  std::vector<SuspectRow> aside;
+  for (const SuspectRow& row : explanation.suspect_rows)
+    if (row.set_aside) aside.push_back(row);
+  Observations result = aside.empty() ? observations : observations.subset(rows_but(observations, aside));
+  result.scatter = explanation.scatter;
+  return result;
+}
+
+Explanation explain(const Observations& observations, const std::vector<const Effect*>& effects,
+                    const SearchSettings& settings) {
+  // A gross error hides what else is there: it is set aside, and said.
+  SetAside aside(observations);
+  std::vector<std::string> said;
+  while (const auto row = gross_row(aside.kept)) {
+    if (aside.room() == 0) break;
+    aside.take({*row});
+  }
+  if (!observations.from_table) {
+    set_mistyped_aside(aside, said);
+    if (const auto wild = wild_runs(aside.kept); wild.size() <= aside.room()) aside.take(wild);
+  }
+  Explanation explanation = explain_once(aside.kept, effects, settings);
+  for (int again = 0; again < kMostSearches; ++again) {
+    const std::vector<SuspectRow> gross = gross_rows(aside.kept, explanation.suspect_rows);
+    if (gross.empty() || gross.size() > aside.room()) break;  // many are no typing errors: the model is wrong
+    aside.take(gross);
+    explanation = explain_once(aside.kept, effects, settings);
+  }
+  if (observations.from_table)
+    explanation = without_isolated(std::move(explanation), aside, effects, settings, said);
+  std::vector<const Effect*> left = effects;
+  SearchSettings unrefuted = settings;
+  explanation = without_refuted(std::move(explanation), aside.kept, left, unrefuted, said);
+  explanation = without_names_of_incomplete(std::move(explanation), aside.kept, left, unrefuted, said);
+  explanation.warnings.insert(explanation.warnings.begin(), said.begin(), said.end());
+  explanation.suspect_rows.insert(explanation.suspect_rows.begin(), aside.rows.begin(), aside.rows.end());
+  return explanation;
+}
+
+}  // namespace tunnelrig

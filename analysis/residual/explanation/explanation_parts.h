@@ -1,0 +1,166 @@
+// Parts of an explanation, in the order in which explain() puts them together.
+#pragma once
+
+#include "analysis/residual/explanation/explanation.h"
+#include "analysis/residual/explanation/seal.h"
+
+namespace tunnelrig {
+
+// --- protocol.cpp
+
+/// The protocol, once, on all rows.
+Explanation explain_once(const Observations& observations, const std::vector<const Effect*>& effects,
+                         const SearchSettings& settings);
+
+// --- estimate_on_all.cpp
+
+/// A model with the scatter that its fit to the open runs allows for.
+struct Fitted {
+  Observations data;
+  JointFit fit;
+};
+
+/// What is held against what: the data with what the search gave groups of their own, and without.
+struct Models {
+  const Observations& wide;
+  const Observations& alone;
+  const Fitted& baseline;
+  const Attribution& found;
+};
+
+/// Parameters with their intervals, structure that the open runs were too few to show, rows that are off, and
+/// what speaks against any of it.
+void estimate_on_all(const Models& models, const Observations& observations,
+                     const std::vector<const Effect*>& effects, const SearchSettings& settings,
+                     Explanation& explanation);
+
+// --- conditions.cpp
+
+/// Effects that cannot be tried and why; conditions that nothing can be found to follow, because they never
+/// changed or the baseline takes it; pairs of covariates that no campaign of this design can tell apart.
+void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
+                       const std::vector<int>& rows, Explanation& explanation);
+
+/// Conditions that change once and for all where an adopted step may be: another battery, other blades.
+void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation);
+
+/// What the search found of the runs' scatter and allowed for: a rotor with more of it, neighbours that
+/// resemble each other.
+void warn_of_scatter(const Observations& observations, Explanation& explanation);
+
+// --- doubts.cpp
+
+/// Candidates that would be named, were it not for their physical bounds.
+void warn_of_bounds(const Observations& observations, const Attribution& found, Explanation& explanation);
+
+/// What the opened seal and the intervals say against what was adopted.
+void warn_of_doubts(Explanation& explanation);
+
+/// Effects of the measured speed that take back a part of its square: noise of the reading does that as well,
+/// and where it would be no more than tachometers have, the two are not to be told apart.
+void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
+                         Explanation& explanation);
+
+/// Conditions that none of the candidates follows, and that go with an adopted effect so nearly that its
+/// size, by its own error, does not tell the two.
+void warn_of_companions(const Observations& observations, const std::vector<const Effect*>& effects,
+                        Explanation& explanation);
+
+/// Constants of a table's thrusts beside their C_T, where the baseline has them.
+void warn_of_tares(const Observations& observations, const MeanModel& model, Explanation& explanation);
+
+/// Rows that stand for themselves, but resemble the row before them in what the model leaves.
+void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
+
+/// By what is adopted and unknown, where there were blocks enough.
+std::string verdict_of(const Explanation& explanation);
+
+// --- incomplete_conditions.cpp
+
+/// Holds what was found, or nothing, against the runs that have conditions of which others lack a value. What
+/// goes with such a condition there is unknown structure, since no name of it can be held against all runs;
+/// names that these runs do not confirm are taken back; and it is `said`.
+Explanation without_names_of_incomplete(Explanation explanation, const Observations& observations,
+                                        const std::vector<const Effect*>& effects,
+                                        const SearchSettings& settings, std::vector<std::string>& said);
+
+// --- change_points.cpp
+
+/// Where a step may lie as well, as far as all runs tell.
+struct ChangePoint {
+  std::size_t term, parameter;
+  double low, high;  // 95 %
+};
+
+/// Steps were sought by the open blocks; all runs tell where they lie.
+MeanModel with_change_points_of_all(const Observations& observations, MeanModel model,
+                                    std::vector<ChangePoint>& result);
+
+/// Sealed runs between the open ones on either side of a step, before or behind it: the open ones do not say
+/// which, so no model could predict them. Nothing where all are.
+std::vector<int> astride_of_steps(const MeanModel& model, const Seal& seal);
+
+// --- estimates.cpp
+
+/// Root mean square of the sealed runs and its 95 % interval: blocks are resampled, Student's t for their
+/// number, on the logarithm. `open`: errors of the open blocks, each predicted from the others, which say how
+/// blocks differ as well; empty where there are none.
+void set_interval(const Observations& observations, const HeldOutErrors& sealed, const HeldOutErrors& open,
+                  std::uint64_t seed, ErrorEstimate& estimate);
+
+/// Jackknife over blocks: value and 95 % interval of every parameter of every term.
+std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observations& observations,
+                                                                const JointFit& fit,
+                                                                const std::vector<int>& rows);
+
+/// The groups' median and its interval; of few groups what holds all of their intervals.
+ParameterEstimate summary_of_groups(const EffectParameter& parameter, std::vector<GroupEstimate> groups);
+
+// --- describe.cpp
+
+/// The curve over its covariate, in the response's unit, with a 95 % band.
+UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
+                          const std::vector<int>& rows);
+
+/// Session scatter that no covariate explains: the sessions' offsets themselves are the shape. Of a rotor;
+/// −1: of the rotors' mean.
+UnknownStructure describe_sessions(const Observations& observations, const Eigen::MatrixXd& residual,
+                                   int rotor, const std::vector<int>& rows);
+
+// --- suspects.cpp
+
+inline constexpr std::size_t kRowsPerGross = 10;  // of a table: at most one row of ten is set aside
+
+double degrees_of_freedom(const Observations& observations, const JointFit& fit,
+                          const std::vector<int>& rows);
+
+/// Rows whose externally studentised residual is beyond what n normal ones reach once in a hundred data sets.
+/// `errors` are of the fitted rows: their variance is σ²(1 − h), where expected_std has σ²(1 + h).
+std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
+                                     const NullFit& variances, double dof);
+
+/// The worst row of a table whose rows stand for themselves, if it is beyond doubt with all that the other
+/// axes can explain in the model.
+std::optional<SuspectRow> gross_row(const Observations& observations);
+
+/// Runs of a campaign in which one rotor is further from the others than any scatter makes it, however heavy
+/// its tails: by medians, which several such runs do not move as they move a fit and its variance. What all
+/// rotors of a run do may be its conditions' work, another speed's for example.
+std::vector<SuspectRow> wild_runs(const Observations& observations);
+
+/// Those that no scatter, however heavy its tails, is likely to have made.
+std::vector<SuspectRow> gross_rows(const Observations& observations, const std::vector<SuspectRow>& suspects);
+
+/// A condition that in one row lies as far from the others as a typing error puts it, or a run far away.
+struct IsolatedValue {
+  std::string row, covariate;
+  double value = 0, low = 0, high = 0;  // low, high: of all other rows
+};
+std::vector<IsolatedValue> isolated_values(const Observations& observations);
+
+/// Of a campaign: those whose runs are to be set aside at once. A condition five ranges away whose run gave
+/// an ordinary thrust on the mean of its rotors (a run at another speed, on purpose, does not); and an air
+/// temperature one range away whose run is far off, which the density made of it.
+std::vector<IsolatedValue> mistyped_values(const Observations& observations);
+
+}  // namespace tunnelrig

@@ -1,0 +1,190 @@
+#include "analysis/residual/explanation/explanation_output.h"
+
+#include <algorithm>
+#include <map>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+std::string name_of_value(const UnknownStructure& unknown, double x) {
+  if (unknown.labels.empty()) return fmt::format("{:g}", x);
+  const std::string& label = unknown.labels[static_cast<std::size_t>(x) - 1];
+  return label.empty() ? "(empty)" : label;
+}
+
+/// What each text or, of few, each value makes: "A −0.012, B 0.012 N".
+std::string levels_in_words(const UnknownStructure& unknown, const std::string& unit) {
+  std::string text;
+  for (const ShapePoint& point : unknown.shape)
+    text += fmt::format("{}{} {:+.3g} ± {:.2g}", text.empty() ? "" : ", ", name_of_value(unknown, point.x),
+                        point.y, (point.high - point.low) / 2);
+  return text + unit;
+}
+
+std::string place_in_words(const std::string& place) {
+  if (place == "tunnel") return "in the tunnel, compared with open space";
+  return fmt::format("in proportion to {} of the location; drawn as it is at {} = 1", place, place);
+}
+
+std::string parameters_in_words(const AdoptedEffect& adopted) {
+  std::string text;
+  for (const ParameterEstimate& parameter : adopted.parameters) {
+    const bool plain = parameter.unit == "1" || !parameter.run.empty();
+    text +=
+        fmt::format("{}{} = {}{} [{:.4g}, {:.4g}]{}", text.empty() ? "" : ", ", parameter.name,
+                    parameter.run.empty() ? fmt::format("{:.4g}", parameter.value)
+                                          : fmt::format("{} (run {:.0f})", parameter.run, parameter.value),
+                    plain ? "" : " " + parameter.unit, parameter.low, parameter.high,
+                    parameter.theory ? " (theory)" : "");
+    if (parameter.groups.empty()) continue;
+    const auto [least, most] =
+        std::minmax_element(parameter.groups.begin(), parameter.groups.end(),
+                            [](const GroupEstimate& a, const GroupEstimate& b) { return a.value < b.value; });
+    text += fmt::format(", the median of {} groups from {:.4g} ({}) to {:.4g} ({})", parameter.groups.size(),
+                        least->value, least->group, most->value, most->group);
+  }
+  return text;
+}
+
+std::string detectable_in_words(const Explanation& e, const std::string& unit) {
+  std::string text = fmt::format("no effect above {:.3g}{} (rms) at 80 % power", e.detectable, unit);
+  if (e.detectable_by_effect.size() > 1) {
+    const auto [least, most] =
+        std::minmax_element(e.detectable_by_effect.begin(), e.detectable_by_effect.end(),
+                            [](const auto& a, const auto& b) { return a.second < b.second; });
+    text += fmt::format("; {} would have been seen from {:.3g}{}, {} from {:.3g}{}", least->first,
+                        least->second, unit, most->first, most->second, unit);
+  }
+  return text + "\n";
+}
+
+/// Lines that a terminal shows whole, indented.
+std::string wrapped(const std::string& text) {
+  constexpr std::size_t kWidth = 100;
+  std::string result, line = " ";
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    if (line.size() + end - begin >= kWidth) {
+      result += line + "\n";
+      line = "    ";
+    }
+    line += " " + text.substr(begin, end - begin);
+    begin = end + 1;
+  }
+  return result + line + "\n";
+}
+
+std::string in_words(const AdoptedEffect& a) {
+  std::string text = fmt::format("\n  {}   p = {:.3g}\n    {}\n    {}\n", a.term.label(), a.p_value,
+                                 a.term.effect->formula, parameters_in_words(a));
+  if (!a.confounded_with.empty())
+    text += fmt::format("    not to be told from: {}\n", fmt::join(a.confounded_with, ", "));
+  if (!a.separating_run && !a.confounded_with.empty() && !a.term.per_group)
+    text += "    no run within reach would tell them apart\n";
+  if (a.separating_run) text += fmt::format("    would tell: {}\n", a.separating_run->text);
+  return text;
+}
+
+std::string could_be_in_words(const UnknownStructure& u) {
+  std::vector<std::string> names;
+  for (const Term& term : u.could_be)
+    names.push_back(term.effect->name + (term.rotor < 0 ? "" : fmt::format(" of rotor {}", term.rotor + 1)) +
+                    (term.at_theory ? " at theory's coefficient" : ""));
+  if (!u.by_sealed_too)
+    return fmt::format("{} may have a part in it: found before it, and not beyond chance beside it",
+                       fmt::join(names, ", or "));
+  return fmt::format("{} would do as well, and could not be scored any more: more sessions would tell",
+                     fmt::join(names, ", or "));
+}
+
+std::string in_words(const UnknownStructure& u, const std::string& unit) {
+  const bool plain = u.covariate_unit.empty() || u.covariate_unit == "1";
+  std::string text =
+      fmt::format("\n  unknown: depends on {}{}{}{}, amplitude {:.3g}{}, p = {:.3g}\n", u.covariate,
+                  plain ? "" : " [" + u.covariate_unit + "]", u.times.empty() ? "" : " × " + u.times,
+                  u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit, u.p_value);
+  if (!u.place.empty()) text += fmt::format("    {}\n", place_in_words(u.place));
+  if (!u.times.empty())
+    text += fmt::format(
+        "    in proportion to how far {0} is from its mean; drawn as it is where {0} is farthest\n", u.times);
+  if (u.levels) text += wrapped("  " + levels_in_words(u, unit));
+  if (u.by_sealed_too)
+    text +=
+        "    only with the sealed blocks in: the others are too few to show it, so it is not in the errors\n";
+  if (!u.could_be.empty()) text += wrapped("  " + could_be_in_words(u));
+  if (!u.instead_of.empty())
+    text += fmt::format("    in which it bends away from the formula of {}\n", fmt::join(u.instead_of, ", "));
+  return text;
+}
+
+std::string errors_in_words(const Explanation& e) {
+  std::string text = fmt::format(
+      "\nerror on blocks held out{}: before {:.4g} [{:.4g}, {:.4g}], after {:.4g} [{:.4g}, {:.4g}], noise "
+      "floor {:.4g}\n",
+      e.unit_suffix().empty() ? "" : " [" + e.unit + "]", e.before.held_out_rmse, e.before.held_out_low,
+      e.before.held_out_high, e.after.held_out_rmse, e.after.held_out_low, e.after.held_out_high,
+      e.noise_floor);
+  if (!e.empirical.empty())
+    text += fmt::format("after is with the empirical curve over {}\n", fmt::join(e.empirical, ", "));
+  const bool scored = std::ranges::any_of(e.unknown, [](const UnknownStructure& u) {
+    return !u.by_sealed_too && !u.shape.empty() && u.covariate != "session";
+  });
+  if (scored && e.empirical.empty())
+    text += "what has no name is in neither: --adopt-empirical gives the error with its curves\n";
+  return text;
+}
+
+/// By reason, so that none stands there twice.
+std::string in_words(const std::vector<Untestable>& untestable) {
+  if (untestable.empty()) return {};
+  std::map<std::string, std::vector<std::string>> by_reason;
+  std::vector<std::string> not_recorded;
+  for (const Untestable& u : untestable)
+    if (u.missing.empty())
+      by_reason[u.reason].push_back(u.effect);
+    else
+      not_recorded.push_back(fmt::format("{} ({})", u.effect, fmt::join(u.missing, ", ")));
+  std::string text = "\nnot testable with these data:\n";
+  for (const auto& [reason, effects] : by_reason)
+    text += wrapped(fmt::format("{}: {}", reason, fmt::join(effects, ", ")));
+  if (!not_recorded.empty())
+    text += wrapped(fmt::format("its condition was not recorded: {}", fmt::join(not_recorded, ", ")));
+  return text;
+}
+
+std::string in_words(const SuspectRow& row) {
+  if (row.studentised == 0) return fmt::format("set aside: {}\n", row.row);
+  return fmt::format("suspect: {} is {:.1f} standard deviations off{}\n", row.row, row.studentised,
+                     row.set_aside ? "; set aside" : "");
+}
+
+}  // namespace
+
+std::string verdict_in_words(const std::string& verdict) {
+  if (verdict == "explained") return "The effects below explain what the model lacked.";
+  if (verdict == "partly_explained")
+    return "The effects below explain a part; structure without a name remains.";
+  if (verdict == "confounded")
+    return "An effect is there, but these data cannot tell which of several it is.";
+  if (verdict == "unknown")
+    return "There is structure, but no candidate accounts for it: the cause is not known.";
+  if (verdict == "no_structure") return "Nothing beyond chance was found.";
+  return "There are too few blocks, or runs, to say anything.";
+}
+
+std::string explanation_text(const Explanation& e) {
+  std::string text = fmt::format("{}{}response {}, baseline {}, {} runs in {} block{}\n\n{}: {}\n",
+                                 e.campaign, e.campaign.empty() ? "" : ": ", e.response, e.baseline, e.runs,
+                                 e.blocks, e.blocks == 1 ? "" : "s", e.verdict, verdict_in_words(e.verdict));
+  for (const AdoptedEffect& adopted : e.adopted) text += in_words(adopted);
+  for (const UnknownStructure& unknown : e.unknown) text += in_words(unknown, e.unit_suffix());
+  text += errors_in_words(e);
+  if (e.verdict == "no_structure") text += detectable_in_words(e, e.unit_suffix());
+  text += in_words(e.untestable);
+  for (const SuspectRow& row : e.suspect_rows) text += in_words(row);
+  return text;
+}
+
+}  // namespace tunnelrig

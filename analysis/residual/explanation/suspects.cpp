@@ -1,0 +1,257 @@
+// Rows that do not belong to the others.
+#include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/upper_median.h"
+#include "calibration/distributions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+double degrees_of_freedom(const Observations& observations, const JointFit& fit,
+                          const std::vector<int>& rows) {
+  const MixedModel mixed(observations, rows, fit.variances.ratio);
+  Index dof = -static_cast<Index>(fit.linear.columns.size());
+  for (std::size_t s = 0; s < mixed.strata().size(); ++s)
+    if (mixed.strata()[s].means()) dof += mixed.dof(s);
+  return static_cast<double>(std::max<Index>(dof, 2));
+}
+
+namespace {
+
+/// Of each run and rotor, in y: its own, and what it has in common with the others.
+MatrixXd variance_of_runs(const Observations& observations, const NullFit& variances,
+                          const std::vector<int>& rows) {
+  const MixedModel mixed = MixedModel::baseline_alone(observations, rows);
+  const VectorXd scatter = observations.scatter.of_runs(rows);
+  MatrixXd result = MatrixXd::Zero(scatter.size(), observations.channels());
+  for (std::size_t s = 0; s < mixed.strata().size(); ++s) {
+    const MixedModel::Stratum& stratum = mixed.strata()[s];
+    if (!stratum.means()) continue;
+    const VectorXd variance =
+        std::pow(variances.sigma[s], 2) * (scatter.array().square() + kRatios[variances.ratio[s]]);
+    result += variance *
+              mixed.rotors_of_modes().middleRows(stratum.first_mode, stratum.modes).colwise().squaredNorm();
+  }
+  return result;
+}
+
+/// Of a normal distribution, by sizes of deviations that a few gross ones may be among.
+double sigma_by_median(const VectorXd& sizes) {
+  constexpr double kMedianOfNormal = 0.6745;
+  return upper_median({sizes.begin(), sizes.end()}) / kMedianOfNormal;
+}
+
+/// σ. A campaign has some 1,700 values that are not typed by hand. Of Student's t with three degrees of
+/// freedom one of 2,300 lies beyond 10 of its standard deviations, one of 19,000 beyond 20.
+double gross_beyond(const Observations& observations) { return observations.from_table ? 10 : 20; }
+
+/// Several gross rows hide each other in the variance: of n rows, k alike are hardly beyond √(n/k) of it. But
+/// they lie apart. Residuals of rows (of a campaign's runs, what is common to the rotors), each from its
+/// group's median, in σ by the median size of all, where these are the farthest (at most one of ten): beyond
+/// what is gross, and twice as far as the next; 0 elsewhere. The tails of a distribution, or of a group that
+/// scatters more, have no such gap.
+VectorXd distance_of_those_apart(const Observations& observations, const std::vector<int>& rows,
+                                 const VectorXd& residual) {
+  constexpr double kGap = 2;
+  constexpr std::size_t kFewestOfGroup = 5;
+  VectorXd away = VectorXd::Zero(residual.size());
+  for (auto& [group, members] : places_of_each(observations.group, rows)) {
+    std::erase_if(members, [&](Index r) { return !std::isfinite(residual(r)); });
+    if (members.empty()) continue;
+    const VectorXd own = residual(members);
+    away(members) =
+        own.array() - (members.size() < kFewestOfGroup ? 0 : upper_median({own.begin(), own.end()}));
+  }
+  const VectorXd size = away.cwiseAbs();
+  const double sigma = sigma_by_median(size);
+  std::vector<double> sorted(size.begin(), size.end());
+  std::sort(sorted.begin(), sorted.end(), std::greater<>());
+  for (std::size_t k = sorted.size() / kRowsPerGross; sigma > 0 && k > 0; --k)
+    if (sorted[k - 1] > gross_beyond(observations) * sigma && sorted[k - 1] >= kGap * sorted[k])
+      return (size.array() >= sorted[k - 1]).select(away / sigma, 0);
+  return VectorXd::Zero(residual.size());
+}
+
+}  // namespace
+
+std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
+                                     const NullFit& variances, double dof) {
+  constexpr double kLeastLeft = 0.02;
+  const MatrixXd sigma2 = variance_of_runs(observations, variances, errors.rows);
+  // On the scale of the model, where residuals are normal: of a tenth and of ten times alike.
+  MatrixXd residual = -errors.error, left = MatrixXd::Ones(residual.rows(), residual.cols());  // 1 − h
+  for (Index r = 0; r < residual.rows(); ++r)
+    for (Index c = 0; c < residual.cols(); ++c) {
+      double unit = 1;
+      if (observations.multiplicative) {
+        const double value = observations.value(errors.rows[static_cast<std::size_t>(r)], c);
+        unit = std::abs(value + errors.error(r, c));  // what was predicted
+        residual(r, c) = std::log(std::abs(value) / unit);
+      }
+      left(r, c) = std::max(2 - std::pow(errors.expected_std(r, c) / unit, 2) / sigma2(r, c), kLeastLeft);
+    }
+  VectorXd apart = distance_of_those_apart(observations, errors.rows, residual.rowwise().mean());
+  residual.array() /= sigma2.array().sqrt();
+  // A gross row under a rare condition may have been taken for scatter that goes with it, and others for
+  // none.
+  if (apart.isZero(0)) apart = distance_of_those_apart(observations, errors.rows, residual.rowwise().mean());
+  const auto missing = residual.array().isNaN();
+  const double variance = missing.select(0, residual).squaredNorm() / missing.select(0, left).sum();
+  const double limit = student_t_quantile(
+      1 - 0.005 / static_cast<double>(std::max<Index>(1, residual.size())), std::max(dof - 1, 1.0));
+  std::vector<SuspectRow> result;
+  for (Index r = 0; r < residual.rows(); ++r) {
+    // A run in which all rotors are off is left out with all of them, or each would hide the others.
+    std::vector<double> inner;
+    double squares = 0;
+    for (Index c = 0; c < residual.cols(); ++c) {
+      if (std::isnan(residual(r, c)) || !(variance > 0)) continue;
+      inner.push_back(residual(r, c) / std::sqrt(variance * left(r, c)));
+      squares += inner.back() * inner.back();
+    }
+    const double own = static_cast<double>(inner.size());
+    const double scale = std::sqrt(std::max(dof - own, 1.0) / std::max(dof - squares, 1.0));
+    double worst = apart(r);
+    for (const double of_rotor : inner)
+      if (std::abs(scale * of_rotor) > std::abs(worst)) worst = scale * of_rotor;
+    if (std::abs(worst) > limit)
+      result.push_back(
+          {.row = observations.name[static_cast<std::size_t>(errors.rows[static_cast<std::size_t>(r)])],
+           .studentised = worst,
+           .apart = apart(r) != 0});
+  }
+  std::sort(result.begin(), result.end(), [](const SuspectRow& a, const SuspectRow& b) {
+    return std::abs(a.studentised) > std::abs(b.studentised);
+  });
+  return result;
+}
+
+std::optional<SuspectRow> gross_row(const Observations& observations) {
+  constexpr double kGross = 6, kFewestLeft = 6;
+  if (!observations.blocks_are_rows || observations.other_axes.empty()) return {};
+  const std::vector<int> rows = observations.all_rows();
+  std::vector<Components> columns;
+  for (const std::string& axis : observations.other_axes) columns.push_back({observations.find(axis)->value});
+  const Components y = response_components(observations);
+  JointFit fit;
+  fit.linear.columns = columns;
+  fit.variances = CandidateScan(MixedModel(observations, rows), columns, {}).null_fit(y);
+  const double dof = degrees_of_freedom(observations, fit, rows);
+  if (dof < kFewestLeft) return {};
+  const HeldOutErrors errors = predict_held_out(observations, y, columns, fit.variances, rows, rows);
+  const std::vector<SuspectRow> suspects = suspect_rows(observations, errors, fit.variances, dof);
+  if (suspects.empty() || std::abs(suspects[0].studentised) < kGross) return {};
+  return suspects[0];
+}
+
+std::vector<SuspectRow> wild_runs(const Observations& observations) {
+  // Of Student's t with three degrees of freedom one of 18,000 lies beyond this.
+  constexpr double kWild = 30;
+  constexpr std::size_t kFewest = 3;  // of two runs or rotors, nothing says which is wrong
+  if (static_cast<std::size_t>(observations.channels()) < kFewest) return {};
+  MatrixXd away = observations.y;
+  for (const auto& [group, runs] : places_of_each(observations.group))
+    for (Index c = 0; c < away.cols(); ++c) {
+      const VectorXd y = observations.y(runs, c);
+      away(runs, c).array() -= upper_median({y.begin(), y.end()});
+      if (runs.size() < kFewest) away(runs, c).setZero();
+    }
+  for (Index r = 0; r < away.rows(); ++r) {
+    const VectorXd rotors = away.row(r);
+    away.row(r).array() -= upper_median({rotors.begin(), rotors.end()});
+  }
+  for (Index c = 0; c < away.cols(); ++c) {
+    const VectorXd size = away.col(c).cwiseAbs();
+    const double sigma = sigma_by_median(size);
+    away.col(c) /= sigma > 0 ? sigma : std::numeric_limits<double>::infinity();
+  }
+  std::vector<SuspectRow> result;
+  for (Index r = 0; r < away.rows(); ++r) {
+    Index worst = 0;
+    away.row(r).cwiseAbs().maxCoeff(&worst);
+    if (std::abs(away(r, worst)) > kWild)
+      result.push_back({observations.name[static_cast<std::size_t>(r)], away(r, worst)});
+  }
+  return result;
+}
+
+std::vector<SuspectRow> gross_rows(const Observations& observations,
+                                   const std::vector<SuspectRow>& suspects) {
+  std::vector<SuspectRow> result;
+  for (const SuspectRow& row : suspects)
+    if (row.apart || std::abs(row.studentised) > gross_beyond(observations)) result.push_back(row);
+  return result;
+}
+
+namespace {
+
+constexpr double kRangesAway = 5;
+
+/// Values further from all others than so many times their range.
+std::vector<IsolatedValue> values_beyond(const Observations& observations, double ranges) {
+  constexpr Index kFewestRows = 8;
+  std::vector<IsolatedValue> result;
+  for (const Covariate& covariate : observations.covariates) {
+    if (covariate.derived || covariate.per_channel() || !covariate.labels.empty() ||
+        observations.not_usable.contains(covariate.name))
+      continue;
+    const auto at = [&](Index r) { return covariate.value(r, 0); };
+    std::vector<Index> order;  // far from ground and ceiling there is no distance
+    for (Index r = 0; r < covariate.value.rows(); ++r)
+      if (std::isfinite(at(r))) order.push_back(r);
+    if (static_cast<Index>(order.size()) < kFewestRows) continue;
+    std::sort(order.begin(), order.end(), [&](Index a, Index b) { return at(a) < at(b); });
+    const double low = at(order[1]), high = at(order[order.size() - 2]);
+    const auto consider = [&](Index row, double from, double to, double gap) {
+      if (to > from && gap > ranges * (to - from))
+        result.push_back(
+            {observations.name[static_cast<std::size_t>(row)], covariate.name, at(row), from, to});
+    };
+    consider(order.front(), low, at(order.back()), low - at(order.front()));
+    consider(order.back(), at(order.front()), high, at(order.back()) - high);
+  }
+  return result;
+}
+
+/// Of each run, what all rotors have in common beside its location's median, in σ by the median of all.
+VectorXd common_distance(const Observations& observations) {
+  const VectorXd common = observations.y.rowwise().mean();
+  VectorXd away = common;
+  for (const auto& [group, runs] : places_of_each(observations.group)) {
+    const VectorXd own = common(runs);
+    away(runs).array() -= upper_median({own.begin(), own.end()});
+  }
+  const double sigma = sigma_by_median(away.cwiseAbs());
+  return sigma > 0 ? VectorXd(away / sigma) : VectorXd(VectorXd::Zero(away.size()));
+}
+
+}  // namespace
+
+std::vector<IsolatedValue> isolated_values(const Observations& observations) {
+  return values_beyond(observations, kRangesAway);
+}
+
+std::vector<IsolatedValue> mistyped_values(const Observations& observations) {
+  constexpr double kARangeAway = 1, kFarOff = 10;
+  const VectorXd away = common_distance(observations);
+  const auto is_far_off = [&](const IsolatedValue& value) {
+    const auto run = std::find(observations.name.begin(), observations.name.end(), value.row);
+    return std::abs(away(run - observations.name.begin())) > kFarOff;
+  };
+  std::vector<IsolatedValue> result;
+  for (const IsolatedValue& value : isolated_values(observations))
+    if (!is_far_off(value)) result.push_back(value);
+  for (const IsolatedValue& value : values_beyond(observations, kARangeAway))
+    if (value.covariate == "air_temperature_C" && is_far_off(value)) result.push_back(value);
+  return result;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,80 @@
+// How well a model predicts runs that its fit did not see.
+#pragma once
+
+#include "analysis/residual/likelihood/likelihood.h"
+
+#include <cstddef>
+#include <vector>
+
+namespace tunnelrig {
+
+/// Errors of the held-out runs. A run whose group the fit did not see has none, and is left out of every
+/// figure.
+struct HeldOutErrors {
+  std::vector<int> rows;
+  Eigen::MatrixXd
+      error;  // rows × channels, response's unit, predicted less measured; NaN where there is none
+  Eigen::MatrixXd
+      expected_std;          // what the error would scatter by if the mean model were exact, unit as above
+  Eigen::VectorXd whitened;  // V^(−½)e over all strata; 0 where there is none
+  double loss() const { return whitened.squaredNorm(); }  // eᵀV⁻¹e: what models are compared by
+  Eigen::VectorXd amplitude;                              // of the columns, from the fit
+
+  double sum_of_squares() const;  // of the errors that there are
+  Eigen::Index count() const;
+};
+
+/// Amplitudes of columns by generalised least squares, baseline taken out.
+struct AmplitudeFit {
+  Eigen::VectorXd amplitude;
+  Eigen::MatrixXd covariance;
+};
+AmplitudeFit fit_amplitudes(const Observations& observations, const Components& y,
+                            const std::vector<Components>& columns, const NullFit& null,
+                            const std::vector<int>& rows);
+
+/// Fits group constants and the columns' amplitudes to y of `fit_rows` by generalised least squares with the
+/// variances of `null`, then predicts `test_rows`. Where a test run's group was not seen but the groups lie
+/// within blocks, the group's constant comes from every other run of it and the errors from the rest.
+HeldOutErrors predict_held_out(const Observations& observations, const Components& y,
+                               const std::vector<Components>& columns, const NullFit& null,
+                               const std::vector<int>& fit_rows, const std::vector<int>& test_rows);
+
+/// Blocks left out at a time, one each; of more blocks than this they are dealt out.
+inline constexpr std::size_t kMostFolds = 24;
+struct Fold {
+  std::vector<int> kept, left_out;  // rows
+};
+std::vector<Fold> leave_out_blocks(const Observations& observations, const std::vector<int>& rows);
+
+/// Leave-one-block-out over the blocks of `rows`.
+struct CrossValidation {
+  std::vector<HeldOutErrors> folds;
+
+  double rmse() const;
+  HeldOutErrors all() const;       // rows and errors of all folds
+  Eigen::VectorXd losses() const;  // of the folds
+};
+CrossValidation cross_validate(const Observations& observations, const Components& y,
+                               const std::vector<Components>& columns, const NullFit& null,
+                               const std::vector<int>& rows);
+
+/// Mean difference of two models' losses over the folds, and its standard error: `worse` less `better`.
+struct LossDifference {
+  double mean = 0, standard_error = 0;
+
+  /// The same from the scatter of the fitted model: e'V⁻¹e changes by 2e'V⁻¹d + d'V⁻¹d where the predictions
+  /// differ by d. Where few folds hold all of the difference, these folds' scatter says nothing of its error,
+  /// and this does.
+  double expected_standard_error = 0;
+
+  double total = 0;  // twice the logarithm of the likelihood ratio of what was held out
+
+  /// Whether the data tell the two models apart: the mean is at least two standard errors (the smaller of the
+  /// two), and the likelihood ratio at least 20. Models that predict nearly the same differ by little,
+  /// however surely.
+  bool told_apart() const;
+};
+LossDifference compare(const CrossValidation& worse, const CrossValidation& better);
+
+}  // namespace tunnelrig

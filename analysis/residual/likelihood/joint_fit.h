@@ -1,0 +1,68 @@
+// The whole model at once: every adopted effect's parameters, refined together by Ceres.
+#pragma once
+
+#include "analysis/residual/likelihood/curves.h"
+#include "analysis/residual/likelihood/held_out.h"
+
+#include <string>
+#include <vector>
+
+namespace tunnelrig {
+
+/// The mean model beyond the baseline: named terms with their parameters, and curves.
+struct MeanModel {
+  std::vector<Term> terms;
+  std::vector<Curve> curves;
+};
+
+/// A mean model at its parameters, ready for linear algebra: what the terms add, and columns for everything
+/// still free.
+struct LinearModel {
+  Components offset;                // what the terms add to y
+  std::vector<Components> columns;  // derivatives by the terms' free parameters, then the curves' columns
+};
+
+/// Forces (responses), n × c each.
+struct Forces {
+  /// Of baseline and terms: group constants and slopes fitted to some rows; with a linear baseline without
+  /// its zero, which is no force. Effects of the run before are in what is fitted but not in here: it is
+  /// loads that a cell remembers, not what it made of them.
+  Eigen::MatrixXd predicted;
+  /// By term: what it acts on, the same without what the term itself adds; where effects add, without what
+  /// those add that act after it.
+  std::vector<Eigen::MatrixXd> acted_on;
+};
+Forces predict_forces(const Observations& observations, const MeanModel& model, const std::vector<int>& rows);
+
+/// The predicted ones alone.
+Eigen::MatrixXd predict_response(const Observations& observations, const MeanModel& model,
+                                 const std::vector<int>& rows);
+
+/// y of the observations, as components.
+Components response_components(const Observations& observations);
+Components difference(const Components& a, const Components& b);
+/// y less columns times their amplitudes.
+Components without(Components y, const std::vector<Components>& columns, const Eigen::VectorXd& amplitude);
+
+LinearModel linearise(const Observations& observations, const MeanModel& model, const Forces& forces);
+
+struct JointFit {
+  MeanModel model;
+  LinearModel linear;
+  NullFit variances;                  // with the model in
+  std::vector<std::string> at_bound;  // "creep of rotor 2 time_constant"
+  bool converged = true;
+};
+
+/// Whether a term's amplitude has come to the end of its physical bounds.
+bool at_bound(const JointFit& fit, const Term& term);
+
+/// Weighted by the variances of the mixed model, which are fitted anew after; group constants and curves are
+/// linear and are projected out. Parameters stay within their physical bounds.
+JointFit fit_jointly(const Observations& observations, const MeanModel& start, const std::vector<int>& rows);
+
+/// The same with known variances, from a start that is nearly there: for jackknives.
+MeanModel refit(const Observations& observations, const MeanModel& start, const NullFit& variances,
+                const std::vector<int>& rows);
+
+}  // namespace tunnelrig

@@ -1,0 +1,31 @@
+// How session variance changes products of projected columns, so that those at every variance come from one.
+#pragma once
+
+#include "analysis/residual/likelihood/mixed_model.h"
+
+namespace tunnelrig {
+
+/// With P_a the inverse covariance V_a⁻¹ less what the baseline absorbs, of session variance a over run
+/// variance,
+///
+///   P_a = P_0 − Σ_i w_i(a) e_i e_iᵀ,   w_i(a) = a λ_i/(1 + a λ_i),
+///
+/// λ_i, e_i from ZᵀP_0Z of the blocks' indicators Z: there are no more of them than blocks. The same e_i
+/// serve all modes of a stratum.
+class SessionDirections {
+ public:
+  SessionDirections(const MixedModel& model, std::size_t stratum);
+
+  /// e_iᵀ of columns that were projected at ratio 0: (directions · modes) × columns.
+  Stacked coordinates(const Stacked& projected) const;
+
+  /// w_i(a), one for each row of coordinates.
+  Eigen::VectorXd weights(double session_ratio) const;
+
+ private:
+  Eigen::Index modes_;
+  Eigen::MatrixXd directions_;  // runs × directions, orthonormal columns
+  Eigen::VectorXd lambda_;
+};
+
+}  // namespace tunnelrig

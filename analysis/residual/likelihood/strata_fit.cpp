@@ -1,0 +1,188 @@
+#include "analysis/residual/likelihood/strata_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+
+bool StrataFit::concerns(int candidate, std::size_t s) const {
+  return columns_.adopted_touch(s) ||
+         (candidate >= 0 && columns_.touches(static_cast<std::size_t>(candidate), s));
+}
+
+void StrataFit::solve(const Data& data, Index set, int candidate, State& state) const {
+  const Index own = candidate < 0 ? 0 : widths_[static_cast<std::size_t>(candidate)];
+  const Index k = adopted_ + own;
+  const std::size_t strata = model_.strata().size();
+  state.rss.resize(strata);
+  for (std::size_t s = 0; s < strata; ++s) state.rss[s] = data[s][state.ratio[s]].squares(set);
+  if (k == 1 && own == 1) {
+    solve_alone(data, set, static_cast<std::size_t>(candidate), state);
+  } else if (k > 0) {
+    for (int pass = 0; pass < 2; ++pass) {
+      SmallMatrix a = SmallMatrix::Zero(k, k);
+      SmallVector b = SmallVector::Zero(k);
+      for (std::size_t s = 0; s < strata; ++s)
+        if (concerns(candidate, s)) accumulate(data, set, candidate, s, state, a, b);
+      state.amplitude = factored(std::move(a)).solve(b);
+      for (std::size_t s = 0; s < strata; ++s)
+        if (concerns(candidate, s)) state.rss[s] = residual(data, set, candidate, s, state);
+    }
+  }
+  state.log_likelihood = 0;
+  for (std::size_t s = 0; s < strata; ++s)
+    state.log_likelihood += stratum_likelihood(s, state.ratio[s], state.rss[s]);
+}
+
+void StrataFit::solve_alone(const Data& data, Index set, std::size_t candidate, State& state) const {
+  const Index column = columns_.first(candidate);
+  for (int pass = 0; pass < 2; ++pass) {
+    double a = 1e-300, b = 0;
+    for (std::size_t s = 0; s < model_.strata().size(); ++s) {
+      if (!columns_.touches(candidate, s)) continue;
+      const std::size_t ratio = state.ratio[s];
+      const double weight = this->weight(s, state);
+      a += weight * columns_.products(s, ratio).candidate[candidate](0, 0);
+      b += weight * data[s][ratio].columns(column, set);
+    }
+    const double amplitude = b / a;
+    state.amplitude = SmallVector::Constant(1, amplitude);
+    for (std::size_t s = 0; s < model_.strata().size(); ++s) {
+      if (!columns_.touches(candidate, s)) continue;
+      const std::size_t ratio = state.ratio[s];
+      const double own = columns_.products(s, ratio).candidate[candidate](0, 0);
+      const double squares = data[s][ratio].squares(set), with = data[s][ratio].columns(column, set);
+      state.rss[s] = std::max(squares - amplitude * (2 * with - amplitude * own), data[s][ratio].least(set));
+    }
+  }
+}
+
+double StrataFit::weight(std::size_t s, const State& state) const {
+  return static_cast<double>(model_.dof(s)) / std::max(state.rss[s], 1e-300);
+}
+
+Eigen::LDLT<SmallMatrix> StrataFit::factored(SmallMatrix normal) {
+  normal.diagonal().array() *= 1 + 1e-12;
+  normal.diagonal().array() += 1e-300;
+  return normal.ldlt();
+}
+
+double StrataFit::stratum_likelihood(std::size_t s, std::size_t ratio, double rss) const {
+  const double dof = static_cast<double>(model_.dof(s));
+  return -0.5 * dof * std::log(std::max(rss, 1e-300) / dof) - model_.log_determinant(s, ratio);
+}
+
+void StrataFit::accumulate(const Data& data, Index set, int candidate, std::size_t s, const State& state,
+                           SmallMatrix& a, SmallVector& b) const {
+  const ScanProducts::Products& p = columns_.products(s, state.ratio[s]);
+  const auto y = data[s][state.ratio[s]].columns.col(set);
+  const double weight = this->weight(s, state);
+  a.topLeftCorner(adopted_, adopted_) += weight * p.adopted_adopted;
+  b.head(adopted_) += weight * y.head(adopted_);
+  if (candidate < 0) return;
+  const auto i = static_cast<std::size_t>(candidate);
+  const Index own = a.rows() - adopted_;
+  a.bottomLeftCorner(own, adopted_) +=
+      weight * p.adopted_candidate.middleCols(columns_.first(i), own).transpose();
+  a.bottomRightCorner(own, own) += weight * p.candidate[i];
+  b.tail(own) += weight * y.segment(columns_.first(i), own);
+}
+
+Eigen::VectorXd StrataFit::scores(const Data& data, Index set, const State& held) const {
+  const Index columns = data[0][0].columns.rows() - adopted_;
+  SmallMatrix normal = SmallMatrix::Zero(adopted_, adopted_);
+  SmallVector of_adopted = SmallVector::Zero(adopted_);
+  Eigen::MatrixXd beside = Eigen::MatrixXd::Zero(adopted_, columns), on_adopted = beside;
+  Eigen::VectorXd with_data = Eigen::VectorXd::Zero(columns);
+  for (std::size_t s = 0; s < held.ratio.size(); ++s) {
+    with_data += weight(s, held) * data[s][held.ratio[s]].columns.col(set).tail(columns);
+    if (!columns_.adopted_touch(s)) continue;
+    accumulate(data, set, -1, s, held, normal, of_adopted);
+    beside += weight(s, held) * columns_.products(s, held.ratio[s]).adopted_candidate.rightCols(columns);
+  }
+  if (adopted_ > 0) {
+    on_adopted = factored(std::move(normal)).solve(beside);
+    with_data -= on_adopted.transpose() * of_adopted;
+  }
+  Eigen::VectorXd result(widths_.size());
+  for (std::size_t i = 0; i < widths_.size(); ++i) {
+    const Index own = widths_[i], first = columns_.first(i) - adopted_;
+    SmallMatrix information = -beside.middleCols(first, own).transpose() * on_adopted.middleCols(first, own);
+    for (std::size_t s = 0; s < held.ratio.size(); ++s)
+      if (columns_.touches(i, s))
+        information += weight(s, held) * columns_.products(s, held.ratio[s]).candidate[i];
+    const auto score = with_data.segment(first, own);
+    result(static_cast<Index>(i)) =
+        0.5 * (own == 1 ? score(0) * score(0) / std::max(information(0, 0), 1e-300)
+                        : score.dot(information.ldlt().solve(score)));
+  }
+  return result;
+}
+
+double StrataFit::spent(const Data& data, const State& state, std::size_t stratum) const {
+  if (adopted_ == 0) return static_cast<double>(columns_.taken_out());
+  SmallMatrix all = SmallMatrix::Zero(adopted_, adopted_), own = all;
+  SmallVector unused = SmallVector::Zero(adopted_);
+  for (std::size_t s = 0; s < model_.strata().size(); ++s) {
+    accumulate(data, 0, -1, s, state, all, unused);
+    if (s == stratum) accumulate(data, 0, -1, s, state, own, unused);
+  }
+  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(all);
+  return solver.solve(Eigen::MatrixXd(own)).trace();
+}
+
+double StrataFit::residual(const Data& data, Index set, int candidate, std::size_t s,
+                           const State& state) const {
+  const ScanProducts::Products& p = columns_.products(s, state.ratio[s]);
+  const ScanProducts::DataProducts& y = data[s][state.ratio[s]];
+  const auto of_adopted = state.amplitude.head(adopted_);
+  SmallVector made = p.adopted_adopted * of_adopted;
+  double gained = 2 * of_adopted.dot(y.columns.col(set).head(adopted_)) - of_adopted.dot(made);
+  if (candidate >= 0) {
+    const auto i = static_cast<std::size_t>(candidate);
+    const Index own = state.amplitude.size() - adopted_, first = columns_.first(i);
+    const auto of_own = state.amplitude.tail(own);
+    made = p.adopted_candidate.middleCols(first, own).transpose() * of_adopted;
+    gained +=
+        2 * of_own.dot(y.columns.col(set).segment(first, own) - made) - of_own.dot(p.candidate[i] * of_own);
+  }
+  return std::max(y.squares(set) - gained, y.least(set));
+}
+
+StrataFit::State StrataFit::best_without(const Data& data, Index set) const {
+  State best{.ratio = std::vector<std::size_t>(model_.strata().size(), 0), .rss = {}, .amplitude = {}};
+  for (std::size_t s = 0; s < best.ratio.size(); ++s) {
+    double highest = -std::numeric_limits<double>::infinity();
+    for (std::size_t ratio = 0; ratio < model_.ratios(); ++ratio) {
+      const double value = stratum_likelihood(s, ratio, data[s][ratio].squares(set));
+      if (value > highest) {
+        highest = value;
+        best.ratio[s] = ratio;
+      }
+    }
+  }
+  solve(data, set, -1, best);
+  if (adopted_ > 0) improve(data, set, -1, best);
+  return best;
+}
+
+void StrataFit::improve(const Data& data, Index set, int candidate, State& best) const {
+  for (std::size_t s = 0; s < model_.strata().size(); ++s) {
+    if (!model_.strata()[s].means()) continue;
+    if (candidate >= 0 && !columns_.touches(static_cast<std::size_t>(candidate), s)) continue;
+    const std::size_t start = best.ratio[s];
+    const std::size_t end = candidate < 0 ? model_.ratios() : start;
+    for (std::size_t ratio = candidate < 0 ? 0 : lowest_tried(start); ratio < end; ++ratio) {
+      State tried = best;
+      tried.ratio[s] = ratio;
+      solve(data, set, candidate, tried);
+      if (tried.log_likelihood > best.log_likelihood) best = std::move(tried);
+    }
+  }
+}
+
+}  // namespace tunnelrig

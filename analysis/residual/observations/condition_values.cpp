@@ -1,0 +1,131 @@
+#include "analysis/residual/observations/condition_values.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <set>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// A value of few is told apart if as many blocks have it as a step needs on either side.
+constexpr std::size_t kBlocksPerLevel = 3, kMostLevels = 12;
+
+double correlation(const Covariate& first, const Covariate& second) {
+  const Eigen::VectorXd u = first.value.col(0).array() - first.value.col(0).mean(),
+                        v = second.value.col(0).array() - second.value.col(0).mean();
+  const double norms = u.norm() * v.norm();
+  return norms > 0 ? u.dot(v) / norms : 0;
+}
+
+const Covariate* number_of_texts(const Observations& observations, const Covariate& texts) {
+  if (texts.labels.empty()) return nullptr;
+  for (const Covariate& number : observations.covariates) {
+    if (!number.labels.empty() || number.derived || number.per_channel() ||
+        !can_be_followed(observations, number))
+      continue;
+    std::map<double, double> of_text, of_number;
+    bool one_to_one = true;
+    for (Index row = 0; row < observations.rows() && one_to_one; ++row) {
+      const double text = texts.value(row, 0), value = number.value(row, 0);
+      one_to_one = of_text.emplace(text, value).first->second == value &&
+                   of_number.emplace(value, text).first->second == text;
+    }
+    if (one_to_one) return &number;
+  }
+  return nullptr;
+}
+
+bool can_be_followed(const Observations& observations, const Covariate& covariate) {
+  return !observations.not_usable.contains(covariate.name) && covariate.value.allFinite() &&
+         !is_constant(covariate);
+}
+
+bool is_constant(const Covariate& covariate) {
+  constexpr double kRounding = 1e-9;  // of the values: a range that is no more is none
+  const double range = covariate.value.maxCoeff() - covariate.value.minCoeff();
+  return range <= kRounding * covariate.value.cwiseAbs().maxCoeff();
+}
+
+double share_beside_cubics(const Observations& observations, const std::vector<int>& rows,
+                           const std::vector<Eigen::VectorXd>& conditions, const Eigen::VectorXd& column) {
+  constexpr int kDegree = 3;
+  MatrixXd columns(column.size(), kDegree * static_cast<Index>(conditions.size()) + 1);
+  Index next = 0;
+  for (const Eigen::VectorXd& condition : conditions) {
+    const Eigen::ArrayXd x = condition.array() - condition.mean();
+    for (int power = 1; power <= kDegree; ++power) columns.col(next++) = (x / x.abs().maxCoeff()).pow(power);
+  }
+  columns.col(next) = column;
+  for (const auto& [group, members] : places_of_each(observations.group, rows)) {
+    const MatrixXd own = columns(members, Eigen::all);
+    columns(members, Eigen::all) = own.rowwise() - own.colwise().mean();
+  }
+  const MatrixXd cubics = columns.leftCols(next);
+  const Eigen::VectorXd whole = columns.col(next);
+  const Eigen::VectorXd left = whole - cubics * cubics.completeOrthogonalDecomposition().solve(whole);
+  return whole.squaredNorm() > 0 ? left.squaredNorm() / whole.squaredNorm() : 0;
+}
+
+int places_on_range(const Covariate& covariate, const std::vector<int>& rows) {
+  constexpr double kApart = 0.01;
+  std::set<double> values;
+  for (const int row : rows) values.insert(covariate.value(row, 0));
+  const double range = *values.rbegin() - *values.begin();
+  int count = 0;
+  auto next = values.begin();
+  while (next != values.end()) {
+    ++count;
+    const auto apart = values.lower_bound(*next + kApart * range);
+    next = apart == next ? std::next(next) : apart;
+  }
+  return count;
+}
+
+int different_values(const Covariate& covariate, const std::vector<int>& rows) {
+  std::set<double> values;
+  for (const int row : rows) values.insert(covariate.value(row, 0));
+  return static_cast<int>(values.size());
+}
+
+std::vector<double> levels_of(const Observations& observations, const Covariate& covariate,
+                              const std::vector<int>& rows) {
+  struct Level {
+    std::size_t rows = 0;
+    std::set<int> blocks;
+  };
+  if (covariate.derived || covariate.per_channel()) return {};
+  std::map<double, Level> all;
+  for (const int row : rows) {
+    Level& level = all[covariate.value(row, 0)];
+    ++level.rows;
+    level.blocks.insert(observations.block[static_cast<std::size_t>(row)]);
+  }
+  std::vector<double> levels;
+  std::size_t held = 0;
+  for (const auto& [value, level] : all) {
+    if (level.blocks.size() < kBlocksPerLevel) continue;
+    levels.push_back(value);
+    held += level.rows;
+  }
+  if (levels.size() < 2 || levels.size() > kMostLevels || 10 * held < 9 * rows.size()) return {};
+  std::iter_swap(levels.begin(), std::max_element(levels.begin(), levels.end(), [&](double a, double b) {
+                   return all[a].rows < all[b].rows;
+                 }));
+  return levels;
+}
+
+double widest_gap(const Covariate& covariate, const std::vector<int>& rows) {
+  std::set<double> values;
+  for (const int row : rows)
+    for (Index c = 0; c < covariate.value.cols(); ++c) values.insert(covariate.value(row, c));
+  double gap = 0;
+  for (auto next = std::next(values.begin()); next != values.end(); ++next)
+    gap = std::max(gap, *next - *std::prev(next));
+  return gap / (*values.rbegin() - *values.begin());
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,361 @@
+#include "analysis/conventions.h"
+#include "analysis/reduction.h"
+#include "analysis/residual/observations/campaign_conditions.h"
+#include "datasets/error.h"
+#include "datasets/locations.h"
+#include "datasets/open_space.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <string>
+
+namespace tunnelrig {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kOpenSpace = "open space";  // group of all its runs
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+struct Source {
+  const CampaignData& data;
+  const Reduction& reduction;
+  std::vector<std::size_t> order;  // of reduction.runs, by time
+
+  Index rows() const { return static_cast<Index>(order.size()); }
+  const RunCoefficients& coefficients(Index row) const {
+    return reduction.runs[order[static_cast<std::size_t>(row)]];
+  }
+  const Run& run(Index row) const { return data.runs[coefficients(row).run]; }
+  const RunStatistics* statistics(Index row) const {
+    const auto found = data.statistics.find(run(row).run);
+    return found == data.statistics.end() || found->second.frames == 0 ? nullptr : &found->second;
+  }
+};
+
+/// cos(π j (w + ½)/W) coefficients of a run's windows, in y's scale: volts times `scale`.
+void set_course(const RunStatistics& statistics, Index row, Index channel, double scale,
+                std::vector<MatrixXd>& shape) {
+  const std::size_t channels = statistics.channels.size();
+  const std::size_t windows = statistics.window_means_V.size() / channels;
+  double sum = 0;
+  std::size_t present = 0;
+  const auto at = [&](std::size_t w) {
+    return statistics.window_means_V[w * channels + static_cast<std::size_t>(channel)];
+  };
+  for (std::size_t w = 0; w < windows; ++w) {
+    if (std::isnan(at(w))) continue;
+    sum += at(w);
+    ++present;
+  }
+  for (std::size_t j = 1; j <= shape.size(); ++j) {
+    double coefficient = 0;
+    for (std::size_t w = 0; w < windows; ++w) {
+      if (std::isnan(at(w))) continue;  // a lost window counts as the run's mean
+      coefficient += (at(w) - sum / static_cast<double>(present)) *
+                     std::cos(std::numbers::pi * static_cast<double>(j) * (static_cast<double>(w) + 0.5) /
+                              static_cast<double>(windows));
+    }
+    shape[j - 1](row, channel) = 2 * coefficient / static_cast<double>(windows) * scale;
+  }
+}
+
+/// Where every run has windows enough, what happened within it.
+void add_courses(const Source& source, Observations& result) {
+  for (Index row = 0; row < source.rows(); ++row) {
+    const RunStatistics* statistics = source.statistics(row);
+    if (statistics == nullptr ||
+        statistics->window_means_V.size() < 2 * kShapes * statistics->channels.size())
+      return;
+  }
+  result.shape.assign(kShapes, MatrixXd::Zero(source.rows(), result.channels()));
+  for (Index row = 0; row < source.rows(); ++row) {
+    for (Index c = 0; c < result.channels(); ++c) {
+      const double per_volt = result.response == "thrust" ? result.newtons_per_volt(c) : 1;
+      const double scale = result.multiplicative ? per_volt / result.value(row, c) : per_volt;
+      set_course(*source.statistics(row), row, c, scale, result.shape);
+    }
+  }
+}
+
+void add_sheet_covariates(const Source& source, Observations& result) {
+  static const std::set<std::string, std::less<>> kNotConditions = {
+      "repeat", "thrust_1_N", "thrust_2_N", "thrust_3_N", "thrust_4_N", "y_norm", "z_norm"};
+  std::set<std::string> names = {std::string(kGroundDistance), std::string(kCeilingDistance)};
+  for (Index row = 0; row < source.rows(); ++row)
+    for (const auto& [name, value] : source.run(row).numbers)
+      if (!kNotConditions.contains(name)) names.insert(name);
+  for (const std::string& name : names) {
+    Covariate covariate{name, MatrixXd::Constant(source.rows(), 1, kNaN)};
+    Index missing = 0;
+    for (Index row = 0; row < source.rows(); ++row) {
+      const auto value = condition(source.run(row), name);
+      value ? covariate.value(row, 0) = *value : static_cast<double>(++missing);
+    }
+    if (may_be_absent(name) && missing == source.rows()) continue;
+    if (missing > 0 && !may_be_absent(name))
+      result.not_usable[name] = fmt::format("missing in {} of {} runs", missing, source.rows());
+    result.covariates.push_back(std::move(covariate));
+  }
+}
+
+/// Columns of texts: which battery, which blades.
+void add_texts(const Source& source, Observations& result) {
+  std::set<std::string> names;
+  for (Index row = 0; row < source.rows(); ++row)
+    for (const auto& [name, text] : source.run(row).labels) names.insert(name);
+  for (const std::string& name : names) {
+    std::vector<std::string> texts;
+    for (Index row = 0; row < source.rows(); ++row) {
+      const auto& labels = source.run(row).labels;
+      const auto found = labels.find(name);
+      texts.push_back(found == labels.end() ? "" : found->second);
+    }
+    result.covariates.push_back(covariate_of_texts(name, texts));
+  }
+}
+
+/// Amplitudes of lines whose name `chosen` accepts, and the share of clipped samples, per channel.
+void add_raw_covariates(const Source& source, Observations& result) {
+  Index missing = 0;
+  for (Index row = 0; row < source.rows(); ++row) missing += source.statistics(row) == nullptr ? 1 : 0;
+  if (missing == source.rows()) return;
+  const auto add = [&](const std::string& name, const auto& value_of) {
+    if (result.find(name) != nullptr) return;  // a column of runs.csv goes before
+    Covariate covariate{name, MatrixXd::Constant(source.rows(), result.channels(), kNaN), true};
+    for (Index row = 0; row < source.rows(); ++row)
+      for (Index c = 0; c < result.channels() && source.statistics(row) != nullptr; ++c)
+        covariate.value(row, c) =
+            value_of(*source.statistics(row), source.statistics(row)->channels[static_cast<std::size_t>(c)]);
+    if (missing > 0)
+      result.not_usable[name] = fmt::format("missing in {} of {} runs", missing, source.rows());
+    result.covariates.push_back(std::move(covariate));
+  };
+  const auto lines = [](bool (*chosen)(std::string_view)) {
+    return [chosen](const RunStatistics&, const ChannelStatistics& channel) {
+      return amplitude_of_lines_V(channel, chosen);
+    };
+  };
+  add("clip_fraction", [](const RunStatistics& run, const ChannelStatistics& channel) {
+    return static_cast<double>(channel.clipped) / static_cast<double>(run.frames);
+  });
+  add("mains_amplitude_V", lines(is_mains));
+  add("alias_amplitude_V", lines([](std::string_view name) { return name.find("alias") != name.npos; }));
+  add("vibration_amplitude_V",
+      lines([](std::string_view name) { return name == "shaft" || name == "blade_pass"; }));
+}
+
+/// Hours since the session's first run, hour of the day, the run's number, and the trend of the air's
+/// temperature.
+void add_derived_covariates(const Source& source, Observations& result) {
+  const Index n = source.rows();
+  std::vector<double> first(result.block_name.size(), std::numeric_limits<double>::infinity());
+  for (const Run& run : source.data.runs) {  // a tare may have begun the session
+    const auto block = std::find(result.block_name.begin(), result.block_name.end(), run.session);
+    if (block != result.block_name.end() && run.kind == RunKind::kThrust)
+      first[static_cast<std::size_t>(block - result.block_name.begin())] =
+          std::min(first[static_cast<std::size_t>(block - result.block_name.begin())], run.start_s);
+  }
+  Covariate hours{"hours_in_session", MatrixXd(n, 1), true, "h of the session"},
+      day{"hour_of_day", MatrixXd(n, 1), true, "h of the day"}, order{"run_order", MatrixXd(n, 1), true};
+  for (Index row = 0; row < n; ++row) {
+    hours.value(row, 0) = (source.run(row).start_s -
+                           first[static_cast<std::size_t>(result.block[static_cast<std::size_t>(row)])]) /
+                          3600;
+    day.value(row, 0) = std::fmod(source.run(row).start_s, 86400) / 3600;
+    order.value(row, 0) = static_cast<double>(row);
+  }
+  for (const Covariate& time : {hours, day})
+    if (result.find(time.name) == nullptr) result.covariates.push_back(time);
+  result.covariates.push_back(order);
+  const Covariate* air = result.find("air_temperature_C");
+  if (air == nullptr) return;
+  Covariate trend{"air_temperature_rate_K_s", MatrixXd::Zero(n, 1), true, "K/s"};
+  for (Index row = 0; row < n; ++row) {
+    Index low = row, high = row;
+    if (row > 0 &&
+        result.block[static_cast<std::size_t>(row - 1)] == result.block[static_cast<std::size_t>(row)])
+      low = row - 1;
+    if (row + 1 < n &&
+        result.block[static_cast<std::size_t>(row + 1)] == result.block[static_cast<std::size_t>(row)])
+      high = row + 1;
+    const double seconds = source.run(high).start_s - source.run(low).start_s;
+    if (seconds > 0) trend.value(row, 0) = (air->value(high, 0) - air->value(low, 0)) / seconds;
+  }
+  result.covariates.push_back(std::move(trend));
+}
+
+/// Open space has one coefficient for all heights where the baseline says so.
+std::string group_of(const Run& run, const std::string& baseline) {
+  return baseline == "open_space" && in_open_space(run) ? kOpenSpace : canonical_location(run.location);
+}
+
+int index_in(std::vector<std::string>& names, const std::string& name) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<int>(found - names.begin());
+  names.push_back(name);
+  return static_cast<int>(names.size()) - 1;
+}
+
+void set_belonging(const Source& source, Observations& result) {
+  std::map<std::string, int> last;
+  for (Index row = 0; row < source.rows(); ++row) {
+    const Run& run = source.run(row);
+    result.name.push_back(run.run);
+    result.group.push_back(index_in(result.group_name, group_of(run, result.baseline)));
+    result.block.push_back(index_in(result.block_name, run.session));
+    result.in_tunnel.push_back(run.in_tunnel());
+    const auto before = last.find(run.session);
+    result.previous.push_back(before == last.end() ? -1 : before->second);
+    last[run.session] = static_cast<int>(row);
+  }
+}
+
+void add_places(const Source& source, Observations& result) {
+  Eigen::VectorXd tunnel = Eigen::VectorXd::Zero(source.rows()), y = tunnel, z = tunnel;
+  for (Index row = 0; row < source.rows(); ++row) {
+    const Run& run = source.run(row);
+    if (!run.in_tunnel()) continue;
+    tunnel(row) = 1;
+    y(row) = *run.y_norm;
+    z(row) = *run.z_norm;
+  }
+  const std::array<Eigen::VectorXd, kPlaces.size()> weights = {tunnel, y, z, y.cwiseAbs()};
+  for (std::size_t i = 0; i < kPlaces.size(); ++i)
+    result.places.push_back({std::string(kPlaces[i]), weights[i]});
+}
+
+struct Response {
+  int channels = 1;
+  std::string unit;
+  std::function<double(Index row, Index channel)> value, known;
+};
+
+Response response_of(const Source& source, const std::string& name, const Eigen::VectorXd& newtons_per_volt) {
+  const Rig& rig = source.data.info.rig;
+  const auto reference_N = [&source, &rig](Index row) {
+    const RunCoefficients& run = source.coefficients(row);
+    return thesis_reference_thrust_N(run.density_kg_m3, run.speed_rpm, rig);
+  };
+  const auto thrust_N = [&source](Index row, Index channel) {
+    return source.coefficients(row).thrust_N[static_cast<std::size_t>(channel)];
+  };
+  if (name == "thrust")
+    return {rig.rotors, "N", thrust_N, [=](Index row, Index) { return reference_N(row); }};
+  if (name == "cell") {
+    return {rig.rotors, "V",
+            [=](Index row, Index channel) { return thrust_N(row, channel) / newtons_per_volt(channel); },
+            [=](Index row, Index channel) { return reference_N(row) / newtons_per_volt(channel); }};
+  }
+  if (name == "c_t")
+    return {1, "1", [&source](Index row, Index) { return source.coefficients(row).c_t; },
+            [](Index, Index) { return 1.0; }};
+  return {1, "",
+          [&source, name](Index row, Index) {
+            if (const auto value = source.run(row).number(name)) return *value;
+            throw InputError::at("runs.csv", source.run(row).line, "run {} has no {}, which is the response",
+                                 source.run(row).run, name);
+          },
+          [](Index, Index) { return 1.0; }};
+}
+
+void set_response(const Source& source, const Response& response, Observations& result) {
+  result.unit = response.unit;
+  result.value.resize(source.rows(), response.channels);
+  result.known.resize(source.rows(), response.channels);
+  for (Index row = 0; row < source.rows(); ++row)
+    for (Index c = 0; c < response.channels; ++c) {
+      result.value(row, c) = response.value(row, c);
+      if (std::abs(result.value(row, c)) > kLargestResponse)
+        throw InputError::at("runs.csv", source.run(row).line, "the response {} is {:g}, beyond ±{:g}",
+                             result.response, result.value(row, c), kLargestResponse);
+      result.known(row, c) = response.known(row, c);
+    }
+  result.multiplicative = result.value.minCoeff() > 0;
+  result.y =
+      result.multiplicative ? MatrixXd((result.value.array() / result.known.array()).log()) : result.value;
+}
+
+/// A few runs below zero where all others pull are errors, and would make the whole model additive.
+void leave_out_against_sign(Source& source, const Response& response, Observations& result) {
+  constexpr std::size_t kOneOf = 20;
+  std::vector<std::size_t> kept;
+  std::vector<std::string> reasons;
+  for (Index row = 0; row < source.rows(); ++row) {
+    double lowest = std::numeric_limits<double>::infinity();
+    for (Index c = 0; c < response.channels; ++c) lowest = std::min(lowest, response.value(row, c));
+    if (lowest > 0)
+      kept.push_back(source.order[static_cast<std::size_t>(row)]);
+    else
+      reasons.push_back(fmt::format("{}: {} is {:.4g} {}, not above 0 as in all other runs",
+                                    source.run(row).run, result.response, lowest, response.unit));
+  }
+  if (reasons.size() * kOneOf > source.order.size()) return;
+  source.order = std::move(kept);
+  result.left_out.insert(result.left_out.end(), reasons.begin(), reasons.end());
+}
+
+Observations observe(const CampaignData& data, const ObservationChoice& choice, bool all_runs) {
+  const Reduction reduction = reduce_runs(data, {});
+  Source source{data, reduction, std::vector<std::size_t>(reduction.runs.size())};
+  std::iota(source.order.begin(), source.order.end(), 0U);
+  std::stable_sort(source.order.begin(), source.order.end(), [&](std::size_t a, std::size_t b) {
+    return data.runs[reduction.runs[a].run].start_s < data.runs[reduction.runs[b].run].start_s;
+  });
+  Observations result;
+  result.campaign = data.info.name;
+  result.response = choice.response.empty() ? "thrust" : choice.response;
+  result.baseline = choice.baseline.empty() ? "thesis" : choice.baseline;
+  if (result.baseline != "thesis" && result.baseline != "open_space")
+    throw InputError(fmt::format("--baseline {}: a campaign has thesis and open_space", result.baseline));
+  result.rig = data.info.rig;
+  for (const LeftOutRun& run : reduction.left_out) result.left_out.push_back(run.run + ": " + run.reason);
+  result.newtons_per_volt = Eigen::VectorXd::Ones(data.info.rig.rotors);
+  if (data.certificate)
+    for (int c = 0; c < data.info.rig.rotors; ++c)
+      result.newtons_per_volt(c) = 1 / (data.certificate->cells[static_cast<std::size_t>(c)].gain_V_per_N *
+                                        data.certificate->propellers.factor(c));
+  const Response response = response_of(source, result.response, result.newtons_per_volt);
+  if (result.response != "thrust")
+    result.newtons_per_volt.setOnes();  // volts, and whatever else, as they are
+  if (!all_runs) leave_out_against_sign(source, response, result);
+  set_response(source, response, result);
+  set_belonging(source, result);
+  add_places(source, result);
+  result.slopes.resize(source.rows(), 0);
+  result.duration_s = Eigen::VectorXd::Zero(source.rows());
+  for (Index row = 0; row < source.rows(); ++row)
+    if (const RunStatistics* statistics = source.statistics(row))
+      result.duration_s(row) = statistics->elapsed_s(data.info.daq.sample_rate_hz);
+  add_sheet_covariates(source, result);
+  add_texts(source, result);
+  add_derived_covariates(source, result);
+  add_raw_covariates(source, result);
+  set_conditions_at_zero(data, reduction, source.order, result);
+  if (result.response == "thrust" || result.response == "cell") add_courses(source, result);
+  return result;
+}
+
+}  // namespace
+
+Observations observe_runs(const CampaignData& data, const ObservationChoice& choice) {
+  return observe(data, choice, true);
+}
+
+Observations observe_campaign(const CampaignData& data, const ObservationChoice& choice) {
+  Observations result = observe(data, choice, false);
+  if (result.baseline == "open_space" && std::ranges::count(result.group_name, kOpenSpace) == 0)
+    throw InputError(
+        "--baseline open_space: no run stands at OS, GND… or CEIL…, or has a distance to ground or ceiling");
+  if (!(result.value.maxCoeff() > result.value.minCoeff()))
+    throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain",
+                                 result.response));
+  return result;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,63 @@
+#include "analysis/residual/observations/previous_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// In the scale of y.
+MatrixXd scaled(const Observations& observations, const MatrixXd& predicted) {
+  return observations.multiplicative ? MatrixXd((predicted.array() / observations.known.array()).log())
+                                     : predicted;
+}
+
+bool in_one_group(const Observations& observations, Index row, int other) {
+  return observations.group[static_cast<std::size_t>(row)] ==
+         observations.group[static_cast<std::size_t>(other)];
+}
+
+}  // namespace
+
+MatrixXd variance_of_constants(const Observations& observations, const MatrixXd& predicted) {
+  const double free = static_cast<double>(observations.rows() - observations.groups());
+  const Eigen::RowVectorXd variance =
+      (observations.y - scaled(observations, predicted)).colwise().squaredNorm() / std::max(free, 1.0);
+  VectorXd count = VectorXd::Zero(observations.groups());
+  for (const int group : observations.group) count(group) += 1;
+  return count(observations.group).cwiseInverse() * variance;
+}
+
+PreviousRun::PreviousRun(const Observations& observations, const MatrixXd& predicted)
+    : observations_(observations),
+      predicted_(predicted),
+      constant_variance_(variance_of_constants(observations, predicted)) {}
+
+double PreviousRun::force_of(Index row, Index channel) const {
+  return predicted_(row, channel) * (observations_.sign.size() > 0 ? observations_.sign(row) : 1);
+}
+
+double PreviousRun::force_N(Index row, Index channel) const {
+  constexpr double kSame = 0.01;
+  const int before = observations_.previous[static_cast<std::size_t>(row)];
+  if (before < 0) return std::numeric_limits<double>::quiet_NaN();
+  const double own = force_of(row, channel), previous = force_of(before, channel);
+  const bool same =
+      in_one_group(observations_, row, before) && std::abs(previous - own) < kSame * std::abs(own);
+  return same ? own : previous;
+}
+
+double PreviousRun::error_N(Index row, Index channel) const {
+  const int before = observations_.previous[static_cast<std::size_t>(row)];
+  if (before < 0 || in_one_group(observations_, row, before)) return 0;
+  const double error = std::sqrt(constant_variance_(row, channel) + constant_variance_(before, channel));
+  return observations_.multiplicative ? error * std::abs(force_of(row, channel)) : error;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,157 @@
+#include "analysis/residual/search/search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace tunnelrig {
+
+Search::Search(const Observations& observations, const std::vector<int>& rows,
+               const std::vector<const Effect*>& effects, const SearchSettings& settings)
+    : given_(observations),
+      observations_(observations),
+      rows_(rows),
+      effects_(effects),
+      settings_(settings),
+      curves_(curves_to_try(observations, rows)),
+      y_(response_components(observations)) {}
+
+Attribution Search::run() {
+  begin();
+  add_effects();
+  CurveScan curves = scan_curves();
+  // Once more where rotors differ: what was found while they were taken to be alike may have been scatter.
+  for (int again = 0;
+       again < 2 && (again == 0 || observations_.scatter.rotors_differ()) && begin_with_scatter_of(curves);
+       ++again) {
+    add_effects();
+    curves = scan_curves();
+  }
+  add_curves(curves);
+  find_confounded();
+  smooth_curves();
+  forget_what_has_a_name();
+  result_.session_unknown = session_scatter_is_large();
+  result_.final = fit_;
+  result_.observations = std::move(observations_);
+  return std::move(result_);
+}
+
+StructureLeft Search::run_on_top_of(const Attribution& found, const JointFit& whole) {
+  make_models();
+  list_ways();
+  result_.accepted = found.accepted;
+  result_.curves = found.curves;
+  fit_ = whole;
+  read_back_terms();
+  constexpr std::uint64_t kOther = 2000;
+  salt_ = kOther;  // other data sets than the search before has drawn
+  StructureLeft left;
+  for (std::size_t t = 0; t < result_.accepted.size(); ++t)
+    if (bends_away(t)) left.bent.insert(t);
+  // Of single rows the seal leaves plenty, and what `hold_out` declares is not to be seen by any search.
+  const bool few = !observations_.blocks_are_rows && observations_.held_out.empty();
+  const std::size_t before = result_.curves.size();
+  while (few && static_cast<int>(result_.curves.size()) < settings_.most_curves) {
+    const JointFit without = fit_;
+    if (!add_best_curve(scan_curves())) break;
+    for (std::size_t t = 0; t < result_.accepted.size(); ++t)
+      if (!result_.accepted[t].term.per_group && outshone_by_curve(result_.accepted[t].term))
+        left.bent.insert(t);
+    name_newest_curve(without);
+  }
+  smooth_curves(before);
+  left.curves = {result_.curves.begin() + static_cast<std::ptrdiff_t>(before), result_.curves.end()};
+  left.fit = std::move(fit_);
+  left.rounds = std::move(result_.curve_rounds);
+  return left;
+}
+
+void Search::begin() {
+  RunScatter scatter = std::move(observations_.scatter);
+  observations_ = given_;
+  observations_.scatter = std::move(scatter);
+  make_models();
+  list_ways();
+  result_ = {};
+  result_.baseline = fit_jointly(observations_, {}, rows_);
+  fit_ = result_.baseline;
+  result_.detectable_sigma = detectable_by_one(*mixed_, fit_.variances, settings_.alpha);
+  critical_ = 0;
+}
+
+void Search::make_models() {
+  mixed_ = std::make_unique<MixedModel>(observations_, rows_);
+  baseline_ = std::make_unique<MixedModel>(MixedModel::baseline_alone(observations_, rows_));
+}
+
+void Search::list_ways() {
+  ways_ = all_ways(effects_, observations_, rows_);
+  const OwnEvidence has_evidence(observations_, *baseline_);
+  const auto taken_back = [&](const Term& way) {
+    return std::ranges::any_of(settings_.taken_back, [&](const Term& term) {
+      return term.effect->cause() == way.effect->cause() && term.rotor == way.rotor &&
+             term.other == way.other;
+    });
+  };
+  std::erase_if(ways_, [&](const Term& way) { return taken_back(way) || !has_evidence(way); });
+  points_.clear();
+  for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
+}
+
+OwnEvidence::OwnEvidence(const Observations& observations, const MixedModel& baseline)
+    : observations_(observations),
+      baseline_(baseline),
+      predicted_(predict_response(observations, {terms_of_theory(observations), {}}, baseline.rows())) {}
+
+bool OwnEvidence::operator()(const Term& way) const {
+  return baseline_.sees(respond(way, observations_, predicted_).derivative[0]);
+}
+
+std::optional<Eigen::Index> OwnEvidence::undefined(const Term& way) const {
+  const Eigen::MatrixXd column = respond(way, observations_, predicted_).derivative[0][0];
+  for (Eigen::Index row = 0; row < column.rows(); ++row)
+    if (!column.row(row).allFinite()) return row;
+  return {};
+}
+
+std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,
+                           const std::vector<int>& rows) {
+  std::vector<Term> ways;
+  for (const Effect* effect : effects) {
+    if (!testability(*effect, observations).ok()) continue;
+    for (Term& way : ways_to_try(*effect, observations, rows)) ways.push_back(std::move(way));
+  }
+  return ways;
+}
+
+double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha) {
+  const Eigen::RowVectorXd of_all = mixed.mode_matrix().colwise().sum();
+  double information = 0;
+  for (std::size_t s = 0; s < mixed.strata().size(); ++s) {
+    const MixedModel::Stratum& stratum = mixed.strata()[s];
+    if (!stratum.means()) continue;
+    const double runs = static_cast<double>(std::max<Eigen::Index>(mixed.dof(s) / stratum.modes, 1));
+    information += runs * of_all.segment(stratum.first_mode, stratum.modes).squaredNorm() /
+                   (std::pow(variances.sigma[s], 2) * (1 + kRatios[variances.ratio[s]]));
+  }
+  return deviates(-std::log10(alpha)) / std::sqrt(information);
+}
+
+double deviates(double evidence) {
+  double z = 0;
+  while (-std::log10(std::erfc(z / std::numbers::sqrt2)) < evidence) z += 0.01;
+  return z + 0.84;
+}
+
+Attribution attribute(const Observations& observations, const std::vector<int>& rows,
+                      const std::vector<const Effect*>& effects, const SearchSettings& settings) {
+  return Search(observations, rows, effects, settings).run();
+}
+
+StructureLeft structure_left(const Attribution& found, const JointFit& whole, const std::vector<int>& rows,
+                             const std::vector<const Effect*>& effects, const SearchSettings& settings) {
+  return Search(found.observations, rows, effects, settings).run_on_top_of(found, whole);
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,123 @@
+// From residuals to named effects: the search, on the runs that are not sealed. docs/closed-loop.md has the
+// protocol.
+#pragma once
+
+#include "analysis/residual/likelihood/candidates.h"
+#include "analysis/residual/likelihood/joint_fit.h"
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace tunnelrig {
+
+struct SearchSettings {
+  double alpha = 0.02;
+  int most_effects = 4;
+  int most_curves = 3;
+  std::size_t simulations = 999;
+  std::uint64_t seed = 1;
+  bool empirical = false;    // curves without a name are a part of the model after
+  double session_ratio = 2;  // session scatter is an unknown where σ_session/σ_run is above it beyond doubt
+  std::vector<Term> taken_back;  // found before and refuted: not tried on these rotors again
+  std::function<void(const std::string&)> progress = [](const std::string&) {};
+};
+
+/// One line of a ranking.
+struct Ranked {
+  Term term;
+  double evidence = 0;                       // −log10 p of its own
+  double p = 1;                              // by the maximum over all candidates
+  double amplitude = 0, standard_error = 0;  // mean and 0 where each group has its own
+};
+
+/// What one round of the search saw.
+struct Round {
+  std::vector<Ranked> ranking;      // best way of each effect, best first
+  std::vector<double> null_maxima;  // what the largest evidence is where there is no effect
+  double observed = 0;              // the largest evidence of the data
+  double critical = 0;              // evidence that α asks for
+  std::string outcome;              // in words: what was accepted, or why not
+};
+
+struct Accepted {
+  Term term;
+  double p = 1;
+  double gain = 0;                 // fall of the leave-one-block-out error, response's unit
+  std::vector<Ranked> confounded;  // one way of each effect that does as well
+};
+
+/// A candidate that fitted best by far, with an amplitude that physics does not allow.
+struct BeyondBounds {
+  Term term;
+  double amplitude = 0;  // of its own unit, if nothing held it
+};
+
+struct FoundCurve {
+  Curve curve;
+  double p = 1;
+  std::vector<std::string> instead_of;  // effects that were in, until the curve showed their formulas wrong
+  std::vector<Term> could_be = {};      // one way of each effect that may do as well, and is not accepted
+};
+
+struct Attribution {
+  std::vector<Accepted> accepted;
+  std::vector<FoundCurve> curves;
+  std::vector<BeyondBounds> beyond_bounds;
+  /// Sessions scatter far more than runs: of which rotor, −1 for what several do.
+  std::optional<int> session_unknown = {};
+  JointFit baseline, final;   // without and with the accepted terms and curves
+  Observations observations;  // what `final` speaks of: with a group's own amplitudes among its baseline
+  std::vector<Round> rounds, curve_rounds;
+  double detectable_sigma = 0;  // rms, in y, from which any of the effects is found at 80 % power
+  std::map<std::string, double> detectable_by_effect;  // likewise, of each
+};
+
+/// Candidates that can be tried, each in all its ways.
+std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,
+                           const std::vector<int>& rows);
+
+/// Whether a way would change the forces that the baseline and what is known predict, by more than the
+/// baseline can absorb. What only another effect's changes of the force would show is no evidence of its own.
+class OwnEvidence {
+ public:
+  /// Keeps references. `baseline`: alone, of the runs that count.
+  OwnEvidence(const Observations& observations, const MixedModel& baseline);
+  bool operator()(const Term& way) const;
+  /// The first row in which the way has no finite value: a logarithm of zero, for example.
+  std::optional<Eigen::Index> undefined(const Term& way) const;
+
+ private:
+  const Observations& observations_;
+  const MixedModel& baseline_;
+  Eigen::MatrixXd predicted_;
+};
+
+/// Standard errors that an effect must be of to reach an evidence four times in five: −log10 p of a two-sided
+/// normal deviate, and 0.84.
+double deviates(double evidence);
+
+/// Where no candidate can be tried: rms, in y, of a single effect on all rotors alike that varies from run to
+/// run, and would be found at 80 % power if it were the only candidate.
+double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha);
+
+Attribution attribute(const Observations& observations, const std::vector<int>& rows,
+                      const std::vector<const Effect*>& effects, const SearchSettings& settings);
+
+/// Structure without a name that more runs show beside what was found on some of them.
+struct StructureLeft {
+  std::vector<FoundCurve> curves;
+  JointFit fit;                // to all `rows`: what was found, and then these curves
+  std::vector<Round> rounds;   // of the search
+  std::set<std::size_t> bent;  // of `accepted`: what its covariate does bends away from its formula
+};
+/// `found` speaks of its own observations, which must outlive the call. `whole`: its model fitted to `rows`,
+/// a step where these put it: elsewhere it would leave a structure. `effects`: what the structure could be.
+StructureLeft structure_left(const Attribution& found, const JointFit& whole, const std::vector<int>& rows,
+                             const std::vector<const Effect*>& effects, const SearchSettings& settings);
+
+}  // namespace tunnelrig

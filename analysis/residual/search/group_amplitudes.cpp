@@ -1,0 +1,118 @@
+#include "analysis/residual/search/group_amplitudes.h"
+
+#include "calibration/distributions.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kLeastSeen = 1e-6;  // of a column: below it what is left is rounding
+
+/// Amplitudes of a term by group, within its bounds; 0 where the group does not say.
+VectorXd amplitudes_of(const Observations& observations, const JointFit& fit, std::size_t t,
+                       const std::vector<int>& rows) {
+  const EffectParameter& amplitude = fit.model.terms[t].effect->parameters[0];
+  auto estimates = estimate_by_group(observations, fit.model, t, fit.variances, rows);
+  for (GroupEstimate& estimate : estimates)
+    estimate.value = std::clamp(estimate.value, amplitude.lower, amplitude.upper);
+  return values_by_group(observations, estimates);
+}
+
+}  // namespace
+
+VectorXd values_by_group(const Observations& observations, const std::vector<GroupEstimate>& estimates) {
+  VectorXd result = VectorXd::Zero(observations.groups());
+  for (const GroupEstimate& estimate : estimates)
+    for (int group = 0; group < observations.groups(); ++group)
+      if (observations.group_name[static_cast<std::size_t>(group)] == estimate.group)
+        result(group) = estimate.value;
+  return result;
+}
+
+OwnResponse respond_in_groups(Term term, const VectorXd& amplitude, const Observations& observations,
+                              const MatrixXd& forces) {
+  OwnResponse result{VectorXd::Zero(observations.rows()), VectorXd::Zero(observations.rows())};
+  for (const auto& [group, own] : places_of_each(observations.group)) {
+    term.parameters[0] = amplitude(group);
+    const TermResponse response = respond(term, observations, forces);
+    result.value(own) = response.value[0](own, 0);
+    result.derivative(own) = response.derivative[0][0](own, 0);
+  }
+  return result;
+}
+
+Index place_among_own(const MeanModel& model, std::size_t t) {
+  return std::count_if(model.terms.begin(), model.terms.begin() + static_cast<std::ptrdiff_t>(t),
+                       [](const Term& term) { return term.per_group; });
+}
+
+JointFit fit_in_turns(Observations& observations, const MeanModel& model, const std::vector<int>& rows) {
+  constexpr int kMostTurns = 10;
+  constexpr double kSettled = 1e-4;  // of what the effect does
+  JointFit fit = fit_jointly(observations, model, rows);
+  const Index first = observations.first_own_slope();
+  bool settled = false;
+  for (int turn = 0; turn < kMostTurns && !settled; ++turn) {
+    const Forces forces = predict_forces(observations, fit.model, rows);
+    MatrixXd slopes = observations.slopes, beyond = observations.beyond;
+    settled = true;
+    for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
+      if (!fit.model.terms[t].per_group) continue;
+      const Index k = place_among_own(fit.model, t);
+      const VectorXd by_group = amplitudes_of(observations, fit, t, rows);
+      const VectorXd amplitude = by_group(observations.group);
+      const VectorXd made = amplitude.cwiseProduct(slopes.col(first + k)) + beyond.col(k);
+      const VectorXd with_it = forces.acted_on[t].col(0);  // a part of the baseline
+      const VectorXd acted_on = observations.multiplicative ? VectorXd(with_it.array() / made.array().exp())
+                                                            : VectorXd(with_it - made);
+      const OwnResponse own = respond_in_groups(fit.model.terms[t], by_group, observations, acted_on);
+      slopes.col(first + k) = own.derivative;
+      beyond.col(k) = own.value - amplitude.cwiseProduct(own.derivative);
+      settled &= (own.value - made).norm() <= kSettled * own.value.norm();
+    }
+    if (!slopes.allFinite() || !beyond.allFinite()) break;  // a force that has changed its sign
+    observations.slopes = std::move(slopes);
+    observations.beyond = std::move(beyond);
+    fit = fit_jointly(observations, fit.model, rows);
+  }
+  return fit;
+}
+
+std::vector<GroupEstimate> estimate_by_group(const Observations& observations, const MeanModel& model,
+                                             std::size_t t, const NullFit& variances,
+                                             const std::vector<int>& rows) {
+  const Index column = observations.first_own_slope() + place_among_own(model, t);
+  const Components offset = linearise(observations, model, predict_forces(observations, model, rows)).offset;
+  std::vector<GroupEstimate> result;
+  for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
+    const Index n = static_cast<Index>(own.size()), k = observations.slopes.cols();
+    MatrixXd items(n, k + 2);  // constant and other columns, then x and y
+    items << VectorXd::Ones(n), observations.slopes(own, Eigen::all),
+        observations.y(own, 0) - offset[0](own, 0);
+    items.col(1 + column).swap(items.col(k));
+    whiten(without_numbers(places_of_each(observations.block, own)), observations.scatter.of_runs(own),
+           kRatios[variances.ratio[0]], 0, items);
+    // What the group's other columns make of both is no part of the amplitude (Frisch & Waugh 1933).
+    const MatrixXd others = items.leftCols(k);
+    const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(others);
+    const MatrixXd left = items.rightCols(2) - others * solver.solve(items.rightCols(2));
+    const VectorXd seen = left.col(0), rest = left.col(1);
+    const Index dof = n - 1 - solver.rank();
+    if (dof < 1 || !(seen.norm() > kLeastSeen * items.col(k).norm())) continue;
+    const double amplitude = seen.dot(rest) / seen.squaredNorm();
+    const double variance = (rest - amplitude * seen).squaredNorm() / static_cast<double>(dof);
+    const double half = half_width_95(std::sqrt(variance / seen.squaredNorm()), static_cast<double>(dof));
+    result.push_back({observations.group_name[static_cast<std::size_t>(group)], amplitude, amplitude - half,
+                      amplitude + half});
+  }
+  return result;
+}
+
+}  // namespace tunnelrig

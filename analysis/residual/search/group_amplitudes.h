@@ -1,0 +1,41 @@
+// An effect whose amplitude is each group's own.
+#pragma once
+
+#include "analysis/residual/likelihood/joint_fit.h"
+
+#include <string>
+#include <vector>
+
+namespace tunnelrig {
+
+struct GroupEstimate {
+  std::string group;
+  double value = 0, low = 0, high = 0;  // 95 %
+};
+
+/// Of term t of the model, from `rows`, which scatter as `variances` say; without groups that have too few of
+/// them, or in which the baseline absorbs what the effect does (a moment that is always its force times one
+/// arm).
+std::vector<GroupEstimate> estimate_by_group(const Observations& observations, const MeanModel& model,
+                                             std::size_t t, const NullFit& variances,
+                                             const std::vector<int>& rows);
+
+/// By group; 0 where the estimates have none.
+Eigen::VectorXd values_by_group(const Observations& observations,
+                                const std::vector<GroupEstimate>& estimates);
+
+/// n: what a term does on these forces, with an amplitude for each group, and its derivative by that.
+struct OwnResponse {
+  Eigen::VectorXd value, derivative;
+};
+OwnResponse respond_in_groups(Term term, const Eigen::VectorXd& amplitude, const Observations& observations,
+                              const Eigen::MatrixXd& forces);
+
+/// Of the columns of effects with amplitudes of the groups' own, which one is term t's: from 0.
+Eigen::Index place_among_own(const MeanModel& model, std::size_t t);
+
+/// A joint fit where such effects do what their formulas say at the amplitudes that are found, on forces that
+/// they have not changed themselves: slopes and `beyond` of the observations are set to it.
+JointFit fit_in_turns(Observations& observations, const MeanModel& model, const std::vector<int>& rows);
+
+}  // namespace tunnelrig

@@ -1,0 +1,269 @@
+// Structure without a name.
+#include "analysis/residual/observations/condition_values.h"
+#include "analysis/residual/search/null_maxima.h"
+#include "analysis/residual/search/search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+/// A formula that leaves more than this of its own size, rms, as a curve over its own covariate is not what
+/// the covariate does. One with a time constant or a length can bend towards the curve, and must do less than
+/// it.
+constexpr double kMostLeft = 0.3, kMostLeft_bending = 1;
+
+/// A curve over another condition that leaves no more of an effect's variance than this can do all that the
+/// effect does.
+constexpr double kLittle_other = 0.02;
+
+}  // namespace
+
+void Search::add_curves(const CurveScan& first) {
+  bool added = settings_.most_curves > 0 && add_best_curve(first);
+  while (added) {
+    place_steps();
+    drop_what_a_curve_replaces();
+    add_effects();
+    added = static_cast<int>(result_.curves.size()) < settings_.most_curves && add_best_curve(scan_curves());
+  }
+}
+
+Search::CurveScan Search::scan_curves() const {
+  CurveScan result;
+  for (const Curve& each : curves_) {
+    if (is_described(each)) continue;
+    const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
+      return each.everywhere() && a.term.rotor == each.rotor && is_over(each, a.term.effect->covariates);
+    });
+    // What is straight over few values has a name then, and the bends ask for the rest.
+    if (named && each.shape == CurveShape::kLevels) continue;
+    Curve curve = named ? without_trend(each, rows_) : each;
+    Candidate candidate = as_candidate(curve);
+    if (!mixed_->sees(candidate.columns[0])) continue;
+    result.scan.candidates.push_back(std::move(candidate));
+    result.tried.push_back(std::move(curve));
+  }
+  if (!result.tried.empty()) rank(fit_, result.scan);
+  return result;
+}
+
+bool Search::add_best_curve(const CurveScan& curves) {
+  settings_.progress("looking for structure without a name");
+  const auto& [scan, tried] = curves;
+  if (tried.empty()) return false;
+  const std::size_t best = scan.order[0];
+  NullMaxima maxima = maxima_of(fit_, scan, 1000 + ++salt_);
+  const double p = maxima.p(scan.fits[best].evidence);
+  Round round;
+  round.observed = scan.fits[best].evidence;
+  round.null_maxima = maxima.values();
+  round.outcome = fmt::format("p = {:.3g} for {}", p, tried[best].label());
+  result_.curve_rounds.push_back(std::move(round));
+  if (p > settings_.alpha) return false;
+  add_curve(tried[best], p);
+  return true;
+}
+
+bool Search::is_described(const Curve& curve) const {
+  return std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
+    return (found.curve.covariate == curve.covariate || go_together(found.curve, curve)) &&
+           found.curve.place.name == curve.place.name &&
+           (found.curve.rotor < 0 || found.curve.rotor == curve.rotor);
+  });
+}
+
+bool Search::go_together(const Curve& found, const Curve& curve) const {
+  constexpr double kLittle = 0.02;  // of its variance
+  const bool comparable =
+      found.x.cols() == 1 && curve.x.cols() == 1 && found.labels.empty() && curve.labels.empty();
+  return comparable &&
+         share_beside_cubics(observations_, rows_, {found.x(rows_, 0)}, curve.x(rows_, 0)) < kLittle;
+}
+
+void Search::add_curve(const Curve& curve, double p) {
+  result_.curves.push_back({.curve = curve, .p = p, .instead_of = {}});
+  MeanModel model = fit_.model;
+  model.curves.push_back(curve);
+  fit_ = fit_jointly(observations_, model, rows_);
+  read_back_terms();
+}
+
+void Search::smooth_curves(std::size_t first) {
+  for (std::size_t c = first; c < result_.curves.size(); ++c) {
+    const std::vector<Curve> forms = smooth_forms(observations_, result_.curves[c].curve, rows_);
+    if (forms.empty()) continue;
+    MeanModel rest = fit_.model;
+    rest.curves.erase(rest.curves.begin() + static_cast<std::ptrdiff_t>(c));
+    const JointFit without = fit_jointly(observations_, rest, rows_);
+    std::vector<Candidate> candidates;
+    for (const Curve& form : forms) candidates.push_back(as_candidate(form));
+    const auto fits =
+        CandidateScan(*mixed_, without.linear.columns, candidates).fit(difference(y_, without.linear.offset));
+    const double n = places_on_range(*observations_.find(forms[0].covariate), rows_);
+    const auto criterion = [&](std::size_t i) {  // Hurvich & Tsai 1989
+      const auto k = static_cast<double>(i + 1);
+      return 2 * k * n / std::max(n - k - 2, 1.0) - 2 * fits[i].likelihood_ratio;
+    };
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < forms.size(); ++i)
+      if (criterion(i) < criterion(best)) best = i;
+    result_.curves[c].curve = fit_.model.curves[c] = forms[best];
+    fit_ = fit_jointly(observations_, fit_.model, rows_);
+    read_back_terms();
+  }
+}
+
+void Search::drop_what_a_curve_replaces() {
+  for (std::size_t t = result_.accepted.size(); t-- > 0;) {
+    const Term term = result_.accepted[t].term;
+    // Those of groups stand in the baseline; that forces go with the square of the speed is not in doubt.
+    if (term.per_group || term.effect->theory_only) continue;
+    // What two conditions do together is not what one of them does.
+    const bool product = result_.curves.back().curve.strength.has_value();
+    const JointFit without = fit_without(t);
+    if (outshone_by_curve(term))
+      give_way_to_curve(t, without);
+    else if (!product && !is_still_found(term, without)) {
+      result_.curves.back().could_be.push_back(term);
+      drop(t, without);
+    }
+  }
+}
+
+bool Search::is_still_found(const Term& term, const JointFit& without) {
+  const Scan scan = scan_effects(without);
+  if (scan.order.empty()) return false;
+  return maxima_of(without, scan, 4000 + ++salt_).p(evidence_of(scan, term)) <= settings_.alpha;
+}
+
+void Search::forget_what_has_a_name() {
+  const auto has = [&](const Term& term) {
+    const std::vector<std::string> of_term = own_conditions(*term.effect, observations_);
+    return std::ranges::any_of(result_.accepted, [&](const Accepted& accepted) {
+      const std::vector<std::string> own = own_conditions(*accepted.term.effect, observations_);
+      return std::ranges::find_first_of(own, of_term) != own.end();
+    });
+  };
+  for (FoundCurve& found : result_.curves) std::erase_if(found.could_be, has);
+}
+
+void Search::drop(std::size_t t, const JointFit& without) {
+  result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(t));
+  fit_ = without;
+  read_back_terms();
+}
+
+void Search::give_way_to_curve(std::size_t t, const JointFit& without) {
+  FoundCurve& found = result_.curves.back();
+  found.instead_of.push_back(result_.accepted[t].term.effect->name);
+  drop(t, without);
+  found.curve = with_trend(found.curve);
+  fit_.model.curves.back() = found.curve;
+  fit_ = fit_jointly(observations_, fit_.model, rows_);
+  read_back_terms();
+}
+
+double Search::share_beside(const Curve& curve, const Term& term, const Eigen::MatrixXd& made,
+                            const Eigen::MatrixXd& predicted) const {
+  const Eigen::Index channel = std::max(term.rotor, 0), of_curve = curve.x.cols() > 1 ? channel : 0;
+  const Eigen::VectorXd column = made(rows_, channel);
+  const auto share = [&](const Eigen::VectorXd& of) {
+    return share_beside_cubics(observations_, rows_, {curve.x(rows_, of_curve)}, of);
+  };
+  if (observations_.multiplicative) return share(column);
+  // What an effect adds goes with the force as well, or with the conditions alone.
+  const Eigen::VectorXd of_force = column.cwiseQuotient(predicted(rows_, channel));
+  return std::min(share(column), of_force.allFinite() ? share(of_force) : 1.0);
+}
+
+bool Search::is_work_of_a_curve(const Term& term, const Eigen::MatrixXd& made,
+                                const Eigen::MatrixXd& predicted) const {
+  constexpr double kLittle = 0.1;  // of its variance, over a condition of its own
+  const auto names = own_conditions(*term.effect, observations_);
+  return !term.per_group &&
+         std::any_of(result_.curves.begin(), result_.curves.end(), [&](const FoundCurve& found) {
+           return is_whole_curve_of(found.curve, term) &&
+                  share_beside(found.curve, term, made, predicted) <
+                      (is_over(found.curve, names) ? kLittle : kLittle_other);
+         });
+}
+
+bool Search::is_whole_curve_of(const Curve& curve, const Term& term) {
+  return curve.everywhere() && !curve.strength && curve.tilt.empty() && curve.rotor == term.rotor &&
+         curve.x.size() > 0;
+}
+
+bool Search::outshone_by_curve(const Term& term) const {
+  const Curve& curve = result_.curves.back().curve;
+  const bool over_its_own =
+      !curve.tilt.empty() && is_over(curve, own_conditions(*term.effect, observations_));
+  if (!over_its_own && !is_whole_curve_of(curve, term)) return false;
+  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+  const Eigen::MatrixXd made = respond(term, observations_, predicted).value[0];
+  // Over a condition that tells the effect's own, a curve may be large only because the two cancel.
+  if (!over_its_own && share_beside(curve, term, made, predicted) >= kLittle_other) return false;
+  const double most = term.effect->parameters.size() > 1 ? kMostLeft_bending : kMostLeft;
+  return rms_of(made_by_newest_curve()) > most * rms_of(made);
+}
+
+Eigen::MatrixXd Search::made_by_newest_curve() const {
+  const auto& columns = fit_.model.curves.back().columns;  // the last of the fit
+  const Eigen::VectorXd amplitude = fit_amplitudes(observations_, difference(y_, fit_.linear.offset),
+                                                   fit_.linear.columns, fit_.variances, rows_)
+                                        .amplitude.tail(std::ssize(columns));
+  Eigen::MatrixXd made = Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels());
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    made += amplitude(static_cast<Eigen::Index>(k)) * columns[k][0];
+  return made;
+}
+
+bool Search::bends_away(std::size_t t) {
+  const Term& term = result_.accepted[t].term;
+  if (term.per_group || term.effect->theory_only) return false;
+  CurveScan bends;
+  for (const Curve& curve : curves_) {
+    if (!is_bend_over(curve, own_conditions(*term.effect, observations_), term.rotor) || is_described(curve))
+      continue;
+    Curve bend = without_trend(curve, rows_);
+    if (!mixed_->sees(bend.columns[0])) continue;
+    bends.scan.candidates.push_back(as_candidate(bend));
+    bends.tried.push_back(std::move(bend));
+  }
+  if (bends.tried.empty()) return false;
+  rank(fit_, bends.scan);
+  const std::size_t best = bends.scan.order[0];
+  const double p = maxima_of(fit_, bends.scan, 5000 + ++salt_).p(bends.scan.fits[best].evidence);
+  if (p > settings_.alpha / 2) return false;  // one question of each name, not the largest of many
+  const JointFit without = fit_;
+  add_curve(bends.tried[best], p);
+  const bool bent = outshone_by_curve(result_.accepted[t].term);
+  result_.curves.pop_back();
+  fit_ = without;
+  read_back_terms();
+  return bent;
+}
+
+std::optional<int> Search::session_scatter_is_large() const {
+  const RotorSessions& unlike = observations_.scatter.sessions;
+  std::optional<int> rotor;
+  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
+    if (!mixed_->strata()[s].means()) continue;
+    double below = 0;
+    for (std::size_t r = 0; r < fit_.variances.ratio_probability[s].size(); ++r) {
+      if (kRatios[r] <= settings_.session_ratio * settings_.session_ratio)
+        below += fit_.variances.ratio_probability[s][r];
+    }
+    if (below >= 0.025) continue;
+    const bool own = unlike.rotors.size() == 1 && mixed_->strata()[s].first_mode < unlike.alone;
+    if (!own) return -1;
+    rotor = unlike.rotors[0];
+  }
+  return rotor;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,365 @@
+// Named effects: ranked, tried, accepted one by one.
+#include "analysis/residual/search/null_maxima.h"
+#include "analysis/residual/search/search.h"
+#include "calibration/distributions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kKnownPhysicsWeight = 10;  // theory gives the coefficient: a prior that others lack
+constexpr double kRareWeight = 10;       // stiff blades do not flex, while a Reynolds number all blades have
+constexpr double kTheoryRefused = 0.05;  // p at which the data speak against theory's coefficient
+constexpr double kSwapDecades = 0.7;     // another explains that much better: it takes the place
+constexpr double kClearDecades = 2;      // beyond the one that is accepted: worth a word
+
+double prior_weight(const Term& term, const Observations& observations, std::size_t ways) {
+  const Effect& effect = *term.effect;
+  double weight = effect.theory() ? kKnownPhysicsWeight : 1;
+  // Of a C_T that goes with the speed a cell that bends as much is the rarest cause.
+  const bool bent_cell = effect.name == "nonlinearity" && observations.coefficient;
+  if (effect.name == "blade_flex" || bent_cell) weight /= kRareWeight;
+  if (effect.scope == EffectScope::kRotor && term.rotor >= 0) weight /= 4;
+  if (effect.scope == EffectScope::kPair) weight /= 12;
+  if (effect.has_change_point()) weight /= std::max<double>(1, static_cast<double>(ways));
+  return weight;
+}
+
+}  // namespace
+
+void Search::add_effects() {
+  bool wider = true;
+  while (wider) {
+    while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect())
+      swap_weaker();
+    const Index before = observations_.slopes.cols();
+    let_groups_differ(false);
+    wider = observations_.slopes.cols() > before;
+  }
+}
+
+bool Search::already_in(const Term& way, const MeanModel& model) {
+  return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
+    const bool another_axis = way.effect->name == "crosstalk" && term.effect != way.effect;
+    const bool another_step =
+        way.effect->has_change_point() && !std::equal(way.parameters.begin() + 1, way.parameters.end(),
+                                                      term.parameters.begin() + 1, term.parameters.end());
+    return term.effect->name == way.effect->name && !another_axis && !another_step &&
+           (term.rotor == way.rotor || way.rotor < 0) && term.other == way.other;
+  });
+}
+
+Search::Scan Search::scan_effects(const JointFit& base) const {
+  Scan scan = list_effects(base);
+  rank(base, scan);
+  return scan;
+}
+
+Search::Scan Search::list_effects(const JointFit& base) const {
+  Scan scan;
+  const Eigen::MatrixXd predicted = predict_response(observations_, base.model, rows_);
+  for (const Term& way : ways_) {
+    if (already_in(way, base.model) || was_beyond_bounds(way)) continue;
+    Candidate candidate = candidate_of(way, predicted);
+    const Components& column = candidate.columns[0];
+    if (is_work_of_a_curve(way, column[0], predicted) || !mixed_->sees(column)) continue;
+    scan.ways.push_back(way);
+    scan.candidates.push_back(std::move(candidate));
+  }
+  return scan;
+}
+
+std::optional<BeyondBounds> Search::beyond_bounds(Term way, double start) const {
+  constexpr double kWidths = 10;
+  const EffectParameter& bounded = way.effect->parameters[0];
+  Effect freed = *way.effect;
+  freed.parameters[0].lower -= kWidths * (bounded.upper - bounded.lower);
+  freed.parameters[0].upper += kWidths * (bounded.upper - bounded.lower);
+  MeanModel model = fit_.model;
+  model.terms.push_back(way);
+  model.terms.back().effect = &freed;
+  model.terms.back().parameters[0] = start;
+  const double amplitude = fit_jointly(observations_, model, rows_).model.terms.back().parameters[0];
+  if (!(amplitude < bounded.lower || amplitude > bounded.upper)) return std::nullopt;
+  return BeyondBounds{std::move(way), amplitude};
+}
+
+bool Search::was_beyond_bounds(const Term& way) const {
+  return std::ranges::any_of(result_.beyond_bounds, [&](const BeyondBounds& beyond) {
+    return beyond.term.effect->name == way.effect->name &&
+           std::ranges::any_of(result_.curves, [&](const FoundCurve& found) {
+             return is_over(found.curve, own_conditions(*way.effect, observations_));
+           });
+  });
+}
+
+Candidate Search::candidate_of(const Term& way, const Eigen::MatrixXd& predicted) const {
+  const EffectParameter& amplitude = way.effect->parameters[0];
+  const std::size_t points = points_.at(way.effect->name + std::to_string(way.rotor));
+  return {.columns = {respond(way, observations_, predicted).derivative[0]},
+          .sign = amplitude.lower >= 0   ? 1
+                  : amplitude.upper <= 0 ? -1
+                                         : 0,
+          .weight = prior_weight(way, observations_, points)};
+}
+
+void Search::rank(const JointFit& base, Scan& scan) const {
+  scan.scan = std::make_unique<CandidateScan>(*mixed_, base.linear.columns, scan.candidates);
+  scan.fits = scan.scan->fit(difference(y_, base.linear.offset));
+  scan.order.resize(scan.fits.size());
+  std::iota(scan.order.begin(), scan.order.end(), 0U);
+  std::sort(scan.order.begin(), scan.order.end(),
+            [&](std::size_t a, std::size_t b) { return scan.fits[a].evidence > scan.fits[b].evidence; });
+}
+
+bool Search::add_best_effect() {
+  settings_.progress(fmt::format("looking for effect {}", result_.accepted.size() + 1));
+  const Scan scan = scan_effects_and_groups(fit_);
+  Round round;
+  if (scan.order.empty()) return false;
+  NullMaxima maxima = maxima_of(fit_, scan, ++salt_);
+  const double p = maxima.p(scan.fits[scan.order[0]].evidence);
+  if (p <= settings_.alpha || critical_ == 0) critical_ = maxima.critical();
+  round.observed = scan.fits[scan.order[0]].evidence;
+  round.critical = critical_;
+  round.ranking = ranking(scan, maxima);
+  round.null_maxima = maxima.values();
+  if (result_.rounds.empty()) set_detectable(scan);
+  const bool added = p <= settings_.alpha && accept_first_sound(scan, maxima, round);
+  if (!added && round.outcome.empty())
+    round.outcome = fmt::format("nothing: p = {:.3g} for {}", p, scan.ways[scan.order[0]].label());
+  result_.rounds.push_back(std::move(round));
+  return added;
+}
+
+NullMaxima Search::maxima_of(const JointFit& fit, const Scan& scan, std::uint64_t salt) const {
+  const std::size_t best = scan.order[0];
+  return {*scan.scan, fit.variances, sizes_beside(fit, scan.candidates[best], scan.fits[best]), settings_,
+          salt};
+}
+
+std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const {
+  std::vector<Ranked> result;
+  for (const std::size_t i : scan.order) {
+    const bool seen = std::any_of(result.begin(), result.end(), [&](const Ranked& r) {
+      return r.term.effect->name == scan.ways[i].effect->name;
+    });
+    if (seen) continue;
+    const CandidateFit& fit = scan.fits[i];
+    const bool one = fit.amplitude.size() == 1 && fit.likelihood_ratio > 0;
+    const double amplitude = fit.amplitude.size() > 0 ? fit.amplitude.mean() : 0;
+    result.push_back({scan.ways[i], fit.evidence, maxima.p(fit.evidence), amplitude,
+                      one ? std::abs(amplitude) / std::sqrt(2 * fit.likelihood_ratio) : 0});
+  }
+  return result;
+}
+
+bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round) {
+  std::vector<const Effect*> refused;
+  std::optional<BeyondBounds> beyond;  // of the first, and none about as good is accepted
+  const CrossValidation before = unseen(fit_, fit_.variances);
+  for (const std::size_t best : scan.order) {
+    if (scan.fits[best].evidence < critical_) break;
+    if (beyond && scan.fits[best].evidence < scan.fits[scan.order[0]].evidence - kClearDecades)
+      result_.beyond_bounds.push_back(*std::exchange(beyond, std::nullopt));
+    if (scan.others.contains(best)) {
+      const std::size_t had = result_.accepted.size();
+      if (!accept_together(scan, best, maxima.p(scan.fits[best].evidence))) continue;
+      std::vector<std::string> labels;
+      for (std::size_t k = had; k < result_.accepted.size(); ++k)
+        labels.push_back(result_.accepted[k].term.label());
+      round.outcome += fmt::format("accepted {}", fmt::join(labels, " and "));
+      return true;
+    }
+    if (std::find(refused.begin(), refused.end(), scan.ways[best].effect) != refused.end()) continue;
+    refused.push_back(scan.ways[best].effect);
+    const std::size_t i = alike_instead(scan, best);
+    if (scan.ways[i].per_group) {
+      if (accept_in_groups(scan.ways[i], maxima.p(scan.fits[i].evidence))) {
+        round.outcome += "accepted " + result_.accepted.back().term.label();
+        return true;
+      }
+      round.outcome +=
+          fmt::format("{} predicts unseen blocks no better, or not better than what is alike in all; ",
+                      scan.ways[i].label());
+      continue;
+    }
+    JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
+    const CrossValidation after = unseen(fit, fit.variances);
+    // Both are scored by the variances of the larger model, so that the difference is the mean's.
+    const LossDifference gain = compare(unseen(fit_, fit.variances), after);
+    if (const auto reason = why_not(fit, after, gain)) {
+      round.outcome += *reason + "; ";
+      if (best == scan.order[0] && at_bound(fit, fit.model.terms.back()))
+        beyond = beyond_bounds(scan.ways[i], scan.fits[i].amplitude(0));
+      continue;
+    }
+    result_.accepted.push_back({.term = fit.model.terms.back(),
+                                .p = maxima.p(scan.fits[i].evidence),
+                                .gain = before.rmse() - after.rmse(),
+                                .confounded = {}});
+    fit_ = at_best_run(std::move(fit), 1);
+    read_back_terms();
+    let_groups_differ(true);
+    round.outcome += "accepted " + result_.accepted.back().term.label();
+    return true;
+  }
+  if (beyond) result_.beyond_bounds.push_back(*beyond);
+  return false;
+}
+
+CrossValidation Search::unseen(const JointFit& fit, const NullFit& variances) const {
+  return cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns, variances,
+                        rows_);
+}
+
+std::optional<std::string> Search::why_not(const JointFit& fit, const CrossValidation& after,
+                                           const LossDifference& gain) const {
+  const Term& term = fit.model.terms.back();
+  // Its own amplitude, and those of the effects before it, which it may push out.
+  for (auto each = fit.model.terms.rbegin(); each != fit.model.terms.rend(); ++each) {
+    if (!at_bound(fit, *each)) continue;
+    return each->same_way(term)
+               ? fmt::format("{} would leave its physical bounds", term.label())
+               : fmt::format("with {}, {} would leave its physical bounds", term.label(), each->label());
+  }
+  if (!(gain.mean > gain.standard_error))
+    return fmt::format("{} does not predict unseen blocks", term.label());
+  if (lacks_speed_squared(term))
+    return fmt::format("{} without rotor_speed is no way of the speed", term.label());
+  if (const auto shared = only_bends(term, fit.variances, after))
+    return fmt::format("{} is no more than a bend over {}", term.label(), *shared);
+  if (term.effect->has_change_point() && is_gradual({term}, fit.variances, after))
+    return fmt::format("{} is no better than a gradual change", term.label());
+  return std::nullopt;
+}
+
+JointFit Search::fit_with(Term term, double amplitude) const {
+  const EffectParameter& parameter = term.effect->parameters[0];
+  term.parameters[0] = std::clamp(amplitude, parameter.lower, parameter.upper);
+  MeanModel model = fit_.model;
+  model.terms.push_back(term);
+  JointFit free = fit_jointly(observations_, model, rows_);
+  if (!parameter.theory) return free;
+  model = free.model;
+  model.terms.back().at_theory = true;
+  model.terms.back().parameters[0] = *parameter.theory;
+  JointFit fixed = fit_jointly(observations_, model, rows_);
+  const double ratio = std::max(0.0, free.variances.log_likelihood - fixed.variances.log_likelihood);
+  const bool allowed = ratio_p(ratio, free) > kTheoryRefused;
+  return allowed || term.effect->theory_only ? fixed : free;
+}
+
+double Search::ratio_p(double ratio, const JointFit& fit) const {
+  Index dof = -static_cast<Index>(fit.linear.columns.size());
+  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) dof += mixed_->dof(s);
+  const double n = static_cast<double>(std::max<Index>(dof, 1));
+  return f_upper_p(std::expm1(2 * ratio / (n + 1)) * n, 1, n);
+}
+
+void Search::read_back_terms() {
+  for (std::size_t t = 0; t < result_.accepted.size(); ++t) result_.accepted[t].term = fit_.model.terms[t];
+}
+
+void Search::swap_weaker() {
+  for (std::size_t t = 0; t + 1 < result_.accepted.size(); ++t) {
+    const Term old = result_.accepted[t].term;
+    if (old.per_group) continue;
+    const JointFit without = fit_without(t);
+    const Scan scan = scan_effects(without);
+    if (scan.order.empty()) continue;
+    const std::size_t best = scan.order[0];
+    if (scan.ways[best].same_way(old) || !(scan.fits[best].evidence > evidence_of(scan, old) + kSwapDecades))
+      continue;
+    const JointFit current = fit_;
+    fit_ = without;
+    JointFit tried = fit_with(scan.ways[best], scan.fits[best].amplitude(0));
+    if (!(tried.variances.log_likelihood > current.variances.log_likelihood) || !tried.at_bound.empty()) {
+      fit_ = current;
+      continue;
+    }
+    NullMaxima maxima = maxima_of(without, scan, ++salt_);
+    const auto rmse_of = [this](const JointFit& fit) { return unseen(fit, fit.variances).rmse(); };
+    fit_ = std::move(tried);
+    const auto place = result_.accepted.begin() + static_cast<std::ptrdiff_t>(t);
+    std::rotate(place, place + 1, result_.accepted.end());  // the new term is the model's last
+    result_.accepted.back().p = maxima.p(scan.fits[best].evidence);
+    result_.accepted.back().gain = rmse_of(without) - rmse_of(fit_);
+    read_back_terms();
+  }
+}
+
+double Search::evidence_of(const Scan& scan, const Term& term) const {
+  double highest = 0;
+  for (std::size_t i = 0; i < scan.ways.size(); ++i)
+    if (scan.ways[i].same_way(term)) highest = std::max(highest, scan.fits[i].evidence);
+  return highest;
+}
+
+JointFit Search::fit_without(std::size_t t, const Observations& observations) const {
+  MeanModel model = fit_.model;
+  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+  return fit_jointly(observations, model, rows_);
+}
+
+void Search::set_detectable(const Scan& scan) {
+  std::map<std::string, std::vector<std::pair<double, std::size_t>>> errors;  // rms of one; of each way
+  for (std::size_t i = 0; i < scan.candidates.size(); ++i) {
+    const Term& way = scan.ways[i];
+    const bool alike = way.rotor < 0 || way.effect->scope == EffectScope::kPair;
+    if (!alike || way.per_group || scan.others.contains(i)) continue;
+    const double z = std::sqrt(2 * scan.fits[i].likelihood_ratio);
+    const double size = std::abs(scan.fits[i].amplitude(0)) * rms_of(scan.candidates[i].columns[0][0]);
+    if (z > 0 && size > 0) errors[way.effect->name].emplace_back(size / z, i);
+  }
+  if (errors.empty()) return;
+  std::vector<std::string> names;
+  std::vector<Candidate> typical;
+  for (auto& [name, ways] : errors) {
+    std::sort(ways.begin(), ways.end());
+    names.push_back(name);
+    typical.push_back(scan.candidates[ways[ways.size() / 2].second]);
+  }
+  constexpr std::size_t kDataSets = 100, kFourInFive = 80;
+  std::mt19937_64 random(settings_.seed);
+  const Eigen::MatrixXd amplitude =
+      CandidateScan(*mixed_, {}, typical).critical_amplitudes(fit_.variances, critical_, kDataSets, random);
+  double largest = 0;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    Eigen::VectorXd own = amplitude.col(static_cast<Index>(i));
+    std::nth_element(own.begin(), own.begin() + kFourInFive - 1, own.end());
+    const double needed = own(kFourInFive - 1) * rms_of(typical[i].columns[0][0]);
+    if (!std::isfinite(needed)) continue;
+    result_.detectable_by_effect[names[i]] = needed;
+    largest = std::max(largest, needed);
+  }
+  if (largest > 0) result_.detectable_sigma = largest;
+}
+
+double Search::rms_of(const Eigen::MatrixXd& column) const {
+  Stacked stacked(0, 0);
+  double squares = 0;
+  Index count = 0;
+  for (std::size_t s = 0; s < baseline_->strata().size(); ++s) {
+    if (!baseline_->strata()[s].means()) continue;
+    Components components(1 + observations_.shape.size(),
+                          Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
+    components[0] = column;
+    stacked = baseline_->stack(s, {&components});
+    baseline_->project(s, 0, stacked);
+    squares += stacked.squaredNorm();
+    count += stacked.size();
+  }
+  return std::sqrt(squares / static_cast<double>(count));
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,85 @@
+// What a candidate beyond chance must not be, to get its name.
+#include "analysis/residual/search/search.h"
+#include "analysis/residual/search/step_profile.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+
+/// The baseline of a campaign has the nominal speed, and a table's law over a throttle none, so what the
+/// measured speed does begins with its square. A weaker dependence without it is a reading that scatters, or
+/// something else.
+bool Search::lacks_speed_squared(const Term& term) const {
+  const auto& covariates = term.effect->covariates;
+  const bool of_speed = std::find(covariates.begin(), covariates.end(), "speed_rpm") != covariates.end();
+  const auto is_square = [](const Term& way) { return way.effect->name == "rotor_speed"; };
+  const bool has_none = !observations_.from_table || std::ranges::any_of(ways_, is_square);
+  return has_none && of_speed && term.effect->name != "rotor_speed" &&
+         std::none_of(result_.accepted.begin(), result_.accepted.end(),
+                      [](const Accepted& accepted) { return accepted.term.effect->name == "rotor_speed"; });
+}
+
+std::optional<std::string> Search::only_bends(const Term& term, const NullFit& variances,
+                                              const CrossValidation& with_term) const {
+  for (const Curve& curve : curves_) {
+    const auto shares = [&](const Accepted& other) {
+      return is_over(curve, own_conditions(*other.term.effect, observations_)) &&
+             (other.term.rotor < 0 || other.term.rotor == term.rotor);
+    };
+    if (!is_bend_over(curve, own_conditions(*term.effect, observations_), term.rotor) ||
+        std::none_of(result_.accepted.begin(), result_.accepted.end(), shares))
+      continue;
+    std::vector<Components> columns = fit_.linear.columns;
+    columns.push_back(without_trend(curve, rows_).columns[0]);
+    const CrossValidation with_bend =
+        cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
+    if (!compare(with_bend, with_term).told_apart()) return curve.covariate;
+  }
+  return {};
+}
+
+bool Search::is_gradual(const std::vector<Term>& steps, const NullFit& variances,
+                        const CrossValidation& with_steps) const {
+  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+  std::vector<Components> always;  // of each step, as if it had been from the first run on
+  for (Term step : steps) {
+    step.parameters[step.effect->change_point().value()] = 0;
+    always.push_back(respond(step, observations_, predicted).derivative[0]);
+  }
+  std::vector<Components> columns = fit_.linear.columns;
+  const double half = static_cast<double>(observations_.rows() - 1) / 2;
+  for (const int power : {1, 2}) {
+    for (const Components& after : always) {
+      columns.push_back(after);
+      for (Eigen::MatrixXd& component : columns.back())
+        for (Index row = 0; row < component.rows(); ++row)
+          component.row(row) *= std::pow(static_cast<double>(row) / half - 1, power);
+    }
+    const CrossValidation with_trend =
+        cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
+    if (compare(with_trend, with_steps).mean <= 0) return true;
+  }
+  return false;
+}
+
+JointFit Search::at_best_run(JointFit fit, std::size_t from_newest) const {
+  const std::size_t t = fit.model.terms.size() - from_newest;
+  Term& step = fit.model.terms[t];
+  if (!step.effect->has_change_point()) return fit;
+  const StepProfile profile = step_profile(observations_, fit.model, t, rows_);
+  if (profile.empty() || profile.likeliest() == first_row_of(step)) return fit;
+  MeanModel moved = fit.model;
+  moved.terms[t].parameters[step.effect->change_point().value()] = profile.likeliest();
+  JointFit there = fit_jointly(observations_, moved, rows_);
+  return there.variances.log_likelihood > fit.variances.log_likelihood ? there : fit;
+}
+
+void Search::place_steps() {
+  for (std::size_t k = 1; k <= fit_.model.terms.size(); ++k) fit_ = at_best_run(std::move(fit_), k);
+  read_back_terms();
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,172 @@
+// An effect whose amplitude is each group's own.
+#include "analysis/residual/search/group_amplitudes.h"
+#include "analysis/residual/search/search.h"
+#include "calibration/distributions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+namespace tunnelrig {
+
+using Eigen::Index;
+
+struct Search::InGroups {
+  Observations observations;  // the term's column is a slope of each group's baseline
+  JointFit fit;
+};
+
+/// Only effects that may have either sign: of the others, what all groups have in common is seen first.
+Search::Scan Search::scan_effects_and_groups(const JointFit& base) const {
+  Scan scan = list_effects(base);
+  if (observations_.from_table) {
+    add_group_ways(scan);
+    add_several_axes(scan);
+  } else {
+    add_pairs_of_steps(scan);
+  }
+  rank(base, scan);
+  return scan;
+}
+
+void Search::add_group_ways(Scan& scan) const {
+  constexpr std::size_t kMostGroups = 24;
+  std::set<int> groups;
+  for (const int row : rows_) groups.insert(observations_.group[static_cast<std::size_t>(row)]);
+  if (groups.size() < 2 || groups.size() > kMostGroups) return;
+  const std::size_t alike = scan.ways.size();
+  for (std::size_t i = 0; i < alike; ++i) {
+    const auto& parameters = scan.ways[i].effect->parameters;
+    if (parameters.size() > 1 || parameters[0].theory || parameters[0].lower >= 0 || parameters[0].upper <= 0)
+      continue;
+    Candidate own{.columns = {}, .sign = 0, .weight = kWeightInGroups};
+    for (const int group : groups) {
+      Components column = scan.candidates[i].columns[0];
+      for (Index row = 0; row < observations_.rows(); ++row)
+        if (observations_.group[static_cast<std::size_t>(row)] != group)
+          for (Eigen::MatrixXd& component : column) component.row(row).setZero();
+      if (mixed_->sees(column)) own.columns.push_back(std::move(column));
+    }
+    if (own.columns.size() < 2) continue;
+    scan.ways.push_back(scan.ways[i]);
+    scan.ways.back().per_group = true;
+    scan.candidates.push_back(std::move(own));
+  }
+}
+
+Search::InGroups Search::fit_in_groups(Term term, MeanModel model) const {
+  term.per_group = true;
+  term.at_theory = false;
+  term.parameters[0] = 0;
+  InGroups own{observations_, {}};
+  const TermResponse response =
+      respond(term, observations_, predict_response(observations_, fit_.model, rows_));
+  Eigen::MatrixXd& slopes = own.observations.slopes;
+  slopes.conservativeResize(Eigen::NoChange, slopes.cols() + 1);
+  slopes.rightCols(1) = response.derivative[0][0];
+  Eigen::MatrixXd& beyond = own.observations.beyond;
+  beyond.conservativeResize(slopes.rows(), beyond.cols() + 1);
+  beyond.rightCols(1).setZero();
+  model.terms.push_back(std::move(term));
+  own.fit = fit_in_turns(own.observations, model, rows_);
+  return own;
+}
+
+std::optional<double> Search::gain_of(const InGroups& own, bool before_others) const {
+  const JointFit& fit = own.fit;
+  if (!fit.at_bound.empty()) return {};
+  const CrossValidation after = cross_validate(own.observations, difference(y_, fit.linear.offset),
+                                               fit.linear.columns, fit.variances, rows_);
+  const CrossValidation before = cross_validate(observations_, difference(y_, fit_.linear.offset),
+                                                fit_.linear.columns, fit.variances, rows_);
+  const LossDifference gain = compare(before, after);
+  if (!(gain.mean > gain.standard_error) ||
+      !groups_within_bounds(own.observations, fit, fit.model.terms.size() - 1))
+    return {};
+  if (before_others && another_does_as_well(after, fit.variances)) return {};
+  return before.rmse() - after.rmse();
+}
+
+void Search::take(InGroups own) {
+  observations_ = std::move(own.observations);
+  make_models();
+  fit_ = std::move(own.fit);
+  read_back_terms();
+}
+
+void Search::let_groups_differ(bool before_others) {
+  if (!observations_.from_table || observations_.groups() < 2 || result_.accepted.empty()) return;
+  const Term& newest = result_.accepted.back().term;
+  if (newest.per_group || newest.effect->theory_only) return;
+  MeanModel others = fit_.model;
+  others.terms.pop_back();
+  InGroups own = fit_in_groups(newest, std::move(others));
+  if (p_of_groups(observations_, fit_, own.observations, own.fit) > settings_.alpha) return;
+  if (gain_of(own, before_others)) take(std::move(own));
+}
+
+bool Search::accept_in_groups(const Term& way, double p) {
+  InGroups own = fit_in_groups(way, fit_.model);
+  const std::optional<double> gain = gain_of(own, true);
+  if (!gain) return false;
+  result_.accepted.push_back({.term = own.fit.model.terms.back(), .p = p, .gain = *gain, .confounded = {}});
+  take(std::move(own));
+  return true;
+}
+
+std::size_t Search::alike_instead(const Scan& scan, std::size_t i) const {
+  if (!scan.ways[i].per_group) return i;
+  for (const std::size_t other : scan.order)
+    if (scan.ways[other].effect == scan.ways[i].effect && !scan.ways[other].per_group &&
+        scan.fits[other].evidence >= critical_)
+      return other;
+  return i;
+}
+
+bool Search::another_does_as_well(const CrossValidation& own, const NullFit& variances) const {
+  constexpr std::size_t kTried = 5;
+  if (static_cast<int>(result_.accepted.size()) >= settings_.most_effects) return false;
+  const Scan scan = scan_effects(fit_);
+  std::vector<std::string> tried;
+  for (const std::size_t i : scan.order) {
+    const std::string name = scan.ways[i].label();
+    if (scan.fits[i].evidence < critical_ || tried.size() == kTried) break;
+    if (std::find(tried.begin(), tried.end(), name) != tried.end()) continue;
+    tried.push_back(name);
+    const JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
+    if (!fit.at_bound.empty()) continue;
+    const CrossValidation with_both = cross_validate(observations_, difference(y_, fit.linear.offset),
+                                                     fit.linear.columns, variances, rows_);
+    if (!compare(with_both, own).told_apart()) return true;
+  }
+  return false;
+}
+
+bool Search::groups_within_bounds(const Observations& wider, const JointFit& fit, std::size_t t) const {
+  constexpr std::size_t kOneOf = 20;  // 95 % intervals
+  const EffectParameter& amplitude = fit.model.terms[t].effect->parameters[0];
+  const auto groups = estimate_by_group(wider, fit.model, t, fit.variances, rows_);
+  const auto outside = std::count_if(groups.begin(), groups.end(), [&](const GroupEstimate& group) {
+    return group.low > amplitude.upper || group.high < amplitude.lower;
+  });
+  return static_cast<std::size_t>(outside) * kOneOf <= groups.size();
+}
+
+double Search::p_of_groups(const Observations& fewer, const JointFit& without, const Observations& wider,
+                           const JointFit& with) const {
+  const auto before = sum_of_squares(fewer, without), after = sum_of_squares(wider, with);
+  const double more = before.second - after.second;
+  if (more <= 0 || after.second <= 0) return 1;
+  const double f = (before.first - after.first) / more / (after.first / after.second);
+  return f > 0 ? f_upper_p(f, more, after.second) : 1;
+}
+
+std::pair<double, double> Search::sum_of_squares(const Observations& observations,
+                                                 const JointFit& fit) const {
+  const MixedModel mixed(observations, rows_);
+  const double dof = static_cast<double>(mixed.dof(0) - static_cast<Index>(fit.linear.columns.size()));
+  return {std::pow(fit.variances.sigma[0], 2) * std::max(dof, 1.0), dof};
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,133 @@
+// What runs scatter like, beside what the search has found so far; and the search begun again with it.
+#include "analysis/residual/scatter/contrast_scatter.h"
+#include "analysis/residual/scatter/rotor_scatter.h"
+#include "analysis/residual/scatter/rotor_sessions.h"
+#include "analysis/residual/scatter/run_correlation.h"
+#include "analysis/residual/search/search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace tunnelrig {
+namespace {
+
+bool are_alike(const Eigen::VectorXd& scatter, const Eigen::VectorXd& other) {
+  constexpr double kAlike = 0.05;
+  return scatter.size() == other.size() &&
+         (scatter.size() == 0 || (scatter.cwiseQuotient(other).array().log().abs() < kAlike).all());
+}
+
+/// Runs so far off that data sets with them would be made by them alone, the furthest first. `sizes`: rms 1.
+std::vector<Eigen::Index> far_runs(const std::vector<Eigen::MatrixXd>& sizes, std::size_t most) {
+  constexpr double kFar = 5;
+  std::vector<std::pair<double, Eigen::Index>> far;
+  for (const Eigen::MatrixXd& of_stratum : sizes)
+    for (Eigen::Index run = 0; run < of_stratum.rows(); ++run)
+      if (const double size = of_stratum.row(run).maxCoeff(); size > kFar) far.emplace_back(size, run);
+  std::sort(far.rbegin(), far.rend());
+  std::vector<Eigen::Index> runs;
+  for (const auto& [size, run] : far)
+    if (runs.size() < most && std::find(runs.begin(), runs.end(), run) == runs.end()) runs.push_back(run);
+  return runs;
+}
+
+}  // namespace
+
+std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Candidate& candidate,
+                                                  const CandidateFit& found) const {
+  constexpr Eigen::Index kFewest = 20;
+  constexpr std::size_t kMostFar = 3;
+  if (mixed_->dof(0) < kFewest) return {};
+  const Components residual = without(difference(y_, fit.linear.offset), candidate.columns, found.amplitude);
+  const auto sizes = [&](const std::vector<Eigen::Index>& as_they_are) {
+    std::mt19937_64 random(settings_.seed * 1000003 + 6000);
+    return mixed_->sizes_left(fit.variances.ratio, fit.variances.sigma, residual, candidate.columns,
+                              as_they_are, random);
+  };
+  auto result = sizes({});
+  // Where a condition has one value far out, a curve that is only nearly right is far off without that run.
+  const std::vector<Eigen::Index> far = far_runs(result, kMostFar);
+  return far.empty() || !is_found_without(far, fit, candidate, found) ? result : sizes(far);
+}
+
+bool Search::is_found_without(const std::vector<Eigen::Index>& runs, const JointFit& fit,
+                              const Candidate& candidate, const CandidateFit& found) const {
+  constexpr double kMost = 0.7;
+  const Eigen::Index channels = y_[0].cols();
+  Components nothing;
+  for (const Eigen::MatrixXd& component : y_)
+    nothing.push_back(Eigen::MatrixXd::Zero(component.rows(), component.cols()));
+  std::vector<Components> columns = fit.linear.columns;
+  for (const Eigen::Index run : runs)
+    for (Eigen::Index channel = 0; channel < channels; ++channel) {
+      columns.push_back(nothing);
+      columns.back()[0](run, channel) = 1;
+    }
+  const CandidateScan scan(*mixed_, columns, {candidate});
+  return scan.fit(difference(y_, fit.linear.offset))[0].evidence > kMost * found.evidence;
+}
+
+Search::ScatterBeside Search::scatter_beside(const CurveScan& curves, double least_evidence,
+                                             std::mt19937_64& random) const {
+  const Components y = difference(y_, fit_.linear.offset);
+  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+  const auto beside = [&](const std::vector<Components>& columns) {
+    return ScatterBeside{columns, condition_scatter(observations_, rows_, y, columns, predicted, random)};
+  };
+  // Less ½ ln n for each column and condition.
+  const auto likelihood = [&](const ScatterBeside& of) {
+    const auto parameters = static_cast<double>(of.columns.size() + of.scatter.by_condition.names.size());
+    return of.scatter.variances.log_likelihood - parameters * std::log(static_cast<double>(rows_.size())) / 2;
+  };
+  ScatterBeside alone = beside(fit_.linear.columns);
+  if (curves.tried.empty() || curves.scan.fits[curves.scan.order[0]].evidence < least_evidence) return alone;
+  std::vector<Components> columns = fit_.linear.columns;
+  const auto& best = curves.tried[curves.scan.order[0]].columns;
+  columns.insert(columns.end(), best.begin(), best.end());
+  ScatterBeside with = beside(columns);
+  // A curve may be the scatter of a few runs far out on a condition, and scatter a curve.
+  const bool is_scatter = !alone.scatter.by_condition.names.empty() && likelihood(alone) > likelihood(with);
+  return is_scatter ? alone : with;
+}
+
+bool Search::begin_with_scatter_of(const CurveScan& curves) {
+  const RunScatter& before = observations_.scatter;
+  const bool known = before.rotors_differ();
+  std::mt19937_64 random(settings_.seed * 1000003 + 3000), other(settings_.seed * 1000003 + 4000),
+      third(settings_.seed * 1000003 + 5000), fourth(settings_.seed * 1000003 + 6000),
+      fifth(settings_.seed * 1000003 + 7000);
+  // While a rotor that scatters more was taken for one like the others, the best curve had a part of its
+  // scatter.
+  const ScatterBeside beside = scatter_beside(curves, known ? critical_ : 0, third);
+  const std::vector<Components>& columns = beside.columns;
+  const Components y = difference(y_, fit_.linear.offset);
+  Observations scattered = observations_;
+  RunScatter& scatter = scattered.scatter = {.by_condition = beside.scatter.by_condition};
+  const auto left_beside = [&](const std::vector<Components>& of) {
+    return without(y, of, fit_amplitudes(scattered, y, of, beside.scatter.variances, rows_).amplitude);
+  };
+  const Components residual = left_beside(columns);
+  // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter.
+  const Eigen::VectorXd contrasts = contrast_scatter(scattered, rows_, residual, fifth);
+  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, rows_, residual, other);
+  const MixedModel model(scattered, rows_);
+  const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);
+  scatter.run_correlation = run_correlation(model, variances, residual, random);
+  scatter.runs = run_scatter(observations_, run_sizes(model, variances, y, columns, third));
+  // The best of many curves makes half of what a dozen sessions differ by, whatever that is.
+  if (contrasts.size() == 0)
+    scatter.sessions = rotor_sessions(scattered, rows_, left_beside(fit_.linear.columns), fourth);
+  scatter.contrasts = contrasts;  // after what takes the differences for one stratum
+  if (are_alike(scatter.rotors, before.rotors) && are_alike(contrasts, before.contrasts) &&
+      scatter.sessions.rotors == before.sessions.rotors &&
+      (before.runs.size() > 0) == (scatter.runs.size() > 0) &&
+      before.by_condition.names == scatter.by_condition.names &&
+      (known || scatter.run_correlation == before.run_correlation))
+    return false;
+  observations_.scatter = scatter;
+  begin();
+  return true;
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,98 @@
+#include "analysis/residual/search/step_profile.h"
+
+#include <algorithm>
+#include <iterator>
+#include <set>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+
+/// Rows that leave enough blocks before them and from them on.
+std::vector<int> possible_rows(const Observations& observations, const std::vector<int>& rows) {
+  const auto blocks_up_to = [&](auto first, auto last) {
+    std::set<int> blocks;
+    auto row = first;
+    while (row != last && blocks.size() < kLeastBlocksBesideAStep)
+      blocks.insert(observations.block[static_cast<std::size_t>(*row++)]);
+    return blocks.size() < kLeastBlocksBesideAStep ? std::ssize(rows) : std::distance(first, row);
+  };
+  const auto before = blocks_up_to(rows.begin(), rows.end());
+  const auto behind = blocks_up_to(rows.rbegin(), rows.rend());
+  if (before + behind > std::ssize(rows)) return {};
+  return {rows.begin() + before, rows.end() - behind + 1};
+}
+
+}  // namespace
+
+int first_row_of(const Term& step) {
+  return static_cast<int>(step.parameters[step.effect->change_point().value()]);
+}
+
+int StepProfile::likeliest() const {
+  const auto highest = std::max_element(log_likelihood.begin(), log_likelihood.end());
+  return first_row[static_cast<std::size_t>(highest - log_likelihood.begin())];
+}
+
+int StepProfile::end_of_interval(bool highest) const {
+  const double least = *std::max_element(log_likelihood.begin(), log_likelihood.end()) - kStepInterval;
+  int result = likeliest();
+  for (std::size_t i = 0; i < first_row.size(); ++i)
+    if (log_likelihood[i] > least)
+      result = highest ? std::max(result, first_row[i]) : std::min(result, first_row[i]);
+  return result;
+}
+
+StepProfile step_profile(const Observations& observations, const MeanModel& model, std::size_t t,
+                         const std::vector<int>& rows) {
+  constexpr std::ptrdiff_t kAtOnce = 32;
+  constexpr double kClearlyNot = 3 * kStepInterval;  // beyond it a profile hardly comes back
+  const std::vector<int> possible = possible_rows(observations, rows);
+  StepProfile profile;
+  if (possible.empty()) return profile;
+  Term step = model.terms[t];
+  MeanModel rest = model;
+  rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(t));
+  const Forces forces = predict_forces(observations, rest, rows);
+  const LinearModel linear = linearise(observations, rest, forces);
+  const Components y = difference(response_components(observations), linear.offset);
+  const MixedModel mixed(observations, rows);
+  const auto evaluate = [&](auto first, auto last) {
+    std::vector<Candidate> candidates;
+    for (auto row = first; row != last; ++row) {
+      step.parameters[step.effect->change_point().value()] = *row;
+      candidates.push_back({.columns = {respond(step, observations, forces.predicted).derivative[0]}});
+    }
+    std::vector<double> result;
+    for (const CandidateFit& fit : CandidateScan(mixed, linear.columns, candidates).fit(y))
+      result.push_back(fit.likelihood_ratio);
+    return result;
+  };
+  auto from = std::lower_bound(possible.begin(), possible.end(), first_row_of(model.terms[t]));
+  auto to = from;
+  const auto goes_on = [&](bool up) {
+    if (up ? to == possible.end() : from == possible.begin()) return false;
+    const auto& all = profile.log_likelihood;
+    if (all.empty()) return true;
+    const auto near = std::min(kAtOnce, std::ssize(all));
+    const double at_end = up ? *std::max_element(all.end() - near, all.end())
+                             : *std::max_element(all.begin(), all.begin() + near);
+    return at_end > *std::max_element(all.begin(), all.end()) - kClearlyNot;
+  };
+  bool up = true;
+  while (goes_on(true) || goes_on(false)) {
+    up = goes_on(up) ? up : !up;
+    const auto first = up ? to : from - std::min(kAtOnce, std::distance(possible.begin(), from));
+    const auto last = up ? to + std::min(kAtOnce, std::distance(to, possible.end())) : from;
+    const std::vector<double> values = evaluate(first, last);
+    auto& all = profile.log_likelihood;
+    all.insert(up ? all.end() : all.begin(), values.begin(), values.end());
+    (up ? to : from) = up ? last : first;
+    up = !up;
+  }
+  profile.first_row.assign(from, to);
+  return profile;
+}
+
+}  // namespace tunnelrig
