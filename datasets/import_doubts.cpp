@@ -48,6 +48,20 @@ void doubt_columns(const Sheet& sheet, const std::vector<Run>& runs, Doubts& dou
   }
 }
 
+/// A column that is not read, or in a unit that no effect knows.
+void doubt_conditions(const Sheet& sheet, Doubts& doubts) {
+  for (const std::string& column : sheet.columns) {
+    if (is_made_of_times(column))
+      doubts.push_back(fmt::format("{}:1: column {} is not read: that condition is made of the runs' times",
+                                   sheet.file, column));
+    const std::string_view ours = in_our_unit(column);
+    if (!ours.empty() && !sheet.find(ours))
+      doubts.push_back(fmt::format(
+          "{}:1: column {} is kept as a condition without a meaning: effects read this quantity as {}",
+          sheet.file, column, ours));
+  }
+}
+
 /// Thrusts in grams, or of another rotor.
 void doubt_thrusts(const CampaignInfo& info, const Sheet& sheet, const std::vector<Run>& runs,
                    Doubts& doubts) {
@@ -182,6 +196,7 @@ std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& ru
                                        const std::vector<Run>& runs) {
   Doubts doubts = info.unread;
   doubt_columns(runs_sheet, runs, doubts);
+  doubt_conditions(runs_sheet, doubts);
   doubt_labels(runs_sheet, runs, doubts);
   const UnitDoubts units = unit_doubts(runs_sheet, runs);
   doubts.insert(doubts.end(), units.sentences.begin(), units.sentences.end());

@@ -23,7 +23,7 @@ struct KnownColumn {
 };
 
 constexpr double kLarge = 1e12;
-constexpr std::array<KnownColumn, 16> kKnown = {{
+constexpr std::array<KnownColumn, 17> kKnown = {{
     {"y_norm", -1, 1, "normalised tunnel coordinates lie between -1 and 1"},
     {"z_norm", -1, 1, "normalised tunnel coordinates lie between -1 and 1"},
     {"ground_distance_R", 0, 10000, "a distance in propeller radii"},
@@ -36,31 +36,12 @@ constexpr std::array<KnownColumn, 16> kKnown = {{
     {"supply_voltage_V", 0, 1000, "volts, not millivolts"},
     {"tunnel_airspeed_m_s", -200, 200, "metres per second"},
     {"time_since_motor_start_s", 0, 1e7, "seconds at the first frame"},
+    {"duration_s", 0, 1e6, "seconds over which a row's thrusts are means"},
     {"thrust_1_N", -kLarge, kLarge, "newtons"},
     {"thrust_2_N", -kLarge, kLarge, "newtons"},
     {"thrust_3_N", -kLarge, kLarge, "newtons"},
     {"thrust_4_N", -kLarge, kLarge, "newtons"},
 }};
-
-/// Quantities that are often written in another unit; such a column in place of ours is a mistake, not a
-/// covariate.
-struct UnitTwin {
-  std::string_view ours, theirs;
-};
-constexpr std::array<UnitTwin, 14> kTwins = {{{"air_temperature_C", "air_temperature_K"},
-                                              {"air_temperature_C", "air_temperature_F"},
-                                              {"air_temperature_C", "air_temperature"},
-                                              {"air_pressure_Pa", "air_pressure_hPa"},
-                                              {"air_pressure_Pa", "air_pressure_kPa"},
-                                              {"air_pressure_Pa", "air_pressure_mbar"},
-                                              {"air_pressure_Pa", "air_pressure"},
-                                              {"relative_humidity", "relative_humidity_percent"},
-                                              {"speed_rpm", "speed_rad_s"},
-                                              {"speed_rpm", "speed_hz"},
-                                              {"speed_rpm", "speed"},
-                                              {"supply_voltage_V", "supply_voltage_mV"},
-                                              {"supply_voltage_V", "supply_voltage"},
-                                              {"cell_temperature_C", "cell_temperature_K"}}};
 
 constexpr std::array<std::string_view, 10> kText = {"run",  "location", "session",  "start_utc", "raw",
                                                     "kind", "repeat",   "excluded", "note",      "alarms"};
@@ -75,13 +56,14 @@ const KnownColumn* known_column(std::string_view name) {
   return found == kKnown.end() ? nullptr : found;
 }
 
+/// Such a column in place of ours is a mistake, not a covariate. A distance may be the label's, as radii.
 void check_units(const Sheet& sheet) {
-  for (const UnitTwin& twin : kTwins) {
-    if (sheet.find(twin.theirs) && !sheet.find(twin.ours)) {
-      throw InputError::at(sheet.file, 1,
-                           "column {}: this quantity is read as {}; convert it and rename the column",
-                           twin.theirs, twin.ours);
-    }
+  for (const std::string& column : sheet.columns) {
+    const std::string_view ours = in_our_unit(column);
+    if (known_column(ours) == nullptr || ours.ends_with("_R") || sheet.find(ours)) continue;
+    throw InputError::at(sheet.file, 1,
+                         "column {}: this quantity is read as {}; convert it and rename the column", column,
+                         ours);
   }
 }
 

@@ -96,8 +96,11 @@ void estimate_on_all(const Models& models, const Observations& observations,
   if (found.session_unknown && explanation.unknown.empty())
     explanation.unknown.push_back(
         describe_sessions(observations, fitted.error, *found.session_unknown, rows));
-  explanation.suspect_rows =
-      suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows));
+  for (const SuspectRow& row :
+       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows)))
+    if (std::ranges::find(explanation.suspect_rows, row.row, &SuspectRow::row) ==
+        explanation.suspect_rows.end())
+      explanation.suspect_rows.push_back(row);
   warn_of_alike_rows(observations, explanation);
   warn_of_tares(wide, whole.model, explanation);
   warn_of_changes_at_steps(observations, explanation);

@@ -221,6 +221,7 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
   with_interval(before, baseline, explanation.before);
   with_interval(after, shown, explanation.after);
   const HeldOutErrors whole = all_shown ? after : errors(all_found);
+  explanation.suspect_rows = apart_from_their_block(alone, whole);
   HeldOutErrors curves = before;
   if (!found.curves.empty()) {
     const JointFit fit = fit_jointly(alone, {.terms = {}, .curves = found.final.model.curves}, seal.open);

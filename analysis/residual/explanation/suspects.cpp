@@ -80,24 +80,51 @@ VectorXd distance_of_those_apart(const Observations& observations, const std::ve
   return VectorXd::Zero(residual.size());
 }
 
+/// What was predicted, where the model is of logarithms.
+MatrixXd scale_of_residuals(const Observations& observations, const HeldOutErrors& errors) {
+  if (!observations.multiplicative) return MatrixXd::Ones(errors.error.rows(), errors.error.cols());
+  return (observations.value(errors.rows, Eigen::all) + errors.error).cwiseAbs();
+}
+
+/// On the scale of the model, where residuals are normal: of a tenth and of ten times alike.
+MatrixXd residuals_of(const Observations& observations, const HeldOutErrors& errors) {
+  if (!observations.multiplicative) return -errors.error;
+  return (observations.value(errors.rows, Eigen::all).array().abs() /
+          scale_of_residuals(observations, errors).array())
+      .log();
+}
+
 }  // namespace
+
+std::vector<SuspectRow> apart_from_their_block(const Observations& observations,
+                                               const HeldOutErrors& sealed) {
+  constexpr Index kOthersOfBlock = 4;  // to each that is apart
+  if (observations.blocks_are_rows || !observations.held_out.empty()) return {};
+  const VectorXd apart =
+      distance_of_those_apart(observations, sealed.rows, residuals_of(observations, sealed).rowwise().mean());
+  std::vector<SuspectRow> result;
+  for (const auto& [block, rows] : places_of_each(observations.block, sealed.rows)) {
+    const VectorXd own = apart(rows);
+    const Index gross = (own.array() != 0).count();
+    if (gross * (1 + kOthersOfBlock) > own.size()) continue;
+    for (const Index r : rows)
+      if (apart(r) != 0)
+        result.push_back(
+            {.row = observations.name[static_cast<std::size_t>(sealed.rows[static_cast<std::size_t>(r)])],
+             .studentised = apart(r),
+             .apart = true});
+  }
+  return result;
+}
 
 std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
                                      const NullFit& variances, double dof) {
   constexpr double kLeastLeft = 0.02;
   const MatrixXd sigma2 = variance_of_runs(observations, variances, errors.rows);
-  // On the scale of the model, where residuals are normal: of a tenth and of ten times alike.
-  MatrixXd residual = -errors.error, left = MatrixXd::Ones(residual.rows(), residual.cols());  // 1 − h
-  for (Index r = 0; r < residual.rows(); ++r)
-    for (Index c = 0; c < residual.cols(); ++c) {
-      double unit = 1;
-      if (observations.multiplicative) {
-        const double value = observations.value(errors.rows[static_cast<std::size_t>(r)], c);
-        unit = std::abs(value + errors.error(r, c));  // what was predicted
-        residual(r, c) = std::log(std::abs(value) / unit);
-      }
-      left(r, c) = std::max(2 - std::pow(errors.expected_std(r, c) / unit, 2) / sigma2(r, c), kLeastLeft);
-    }
+  const MatrixXd unit = scale_of_residuals(observations, errors);
+  MatrixXd residual = residuals_of(observations, errors);
+  const MatrixXd left =  // 1 − h
+      (2 - (errors.expected_std.array() / unit.array()).square() / sigma2.array()).cwiseMax(kLeastLeft);
   VectorXd apart = distance_of_those_apart(observations, errors.rows, residual.rowwise().mean());
   residual.array() /= sigma2.array().sqrt();
   // A gross row under a rare condition may have been taken for scatter that goes with it, and others for

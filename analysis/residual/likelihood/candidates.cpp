@@ -114,10 +114,12 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason =
         "only a table's thrust, coefficient, power or torque is held against a baseline without the density "
         "of its air";
-  if (observations.of_no_quantity && !observations.is_line() && is_of_air_or_of_a_cell_in_it(effect))
+  if (observations.of_no_cell && !observations.is_line() && is_of_air_or_of_a_cell_in_it(effect))
     result.reason =
-        "the response is a number without a unit: nothing says that a cell read it, or that the air is in it";
-  if (effect.name == "axial_wind" && observations.of_no_quantity)
+        "nothing says that a cell read the response, or that the air is in it: it is a number without a "
+        "unit, a "
+        "time, a length or the like";
+  if (effect.name == "axial_wind" && observations.of_no_cell)
     result.reason = "nothing says that the response is a rotor's, through which the wind would go";
   if (effect.name == "tip_mach" && observations.from_table) {
     if (observations.find(kDiameter) == nullptr) result.missing.emplace_back(kDiameter);

@@ -142,7 +142,7 @@ struct Observations {
   bool from_table = false, blocks_are_rows = false;
   bool coefficient = false;  // the response is a thrust coefficient, or is made one by its measured speed
   bool of_air = false;       // it is a thrust, a coefficient, power or torque, without the density of the air
-  bool of_no_quantity = false;  // it is a number of which nothing says what it is
+  bool of_no_cell = false;   // nothing says that a cell read it: a number, a time, a length
   bool groups_within_blocks =
       false;  // the block is the group: its baseline is estimated anew where it is held out
   RunScatter scatter;

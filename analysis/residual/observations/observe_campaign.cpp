@@ -4,6 +4,7 @@
 #include "datasets/error.h"
 #include "datasets/locations.h"
 #include "datasets/open_space.h"
+#include "datasets/run_columns.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,6 +19,7 @@ namespace tunnelrig {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kDuration = "duration_s";   // of a run whose thrusts came as means
 constexpr const char* kOpenSpace = "open space";  // group of all its runs
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -85,11 +87,11 @@ void add_courses(const Source& source, Observations& result) {
 
 void add_sheet_covariates(const Source& source, Observations& result) {
   static const std::set<std::string, std::less<>> kNotConditions = {
-      "repeat", "thrust_1_N", "thrust_2_N", "thrust_3_N", "thrust_4_N", "y_norm", "z_norm"};
+      "repeat", "thrust_1_N", "thrust_2_N", "thrust_3_N", "thrust_4_N", "y_norm", "z_norm", kDuration};
   std::set<std::string> names = {std::string(kGroundDistance), std::string(kCeilingDistance)};
   for (Index row = 0; row < source.rows(); ++row)
     for (const auto& [name, value] : source.run(row).numbers)
-      if (!kNotConditions.contains(name)) names.insert(name);
+      if (!kNotConditions.contains(name) && !is_made_of_times(name)) names.insert(name);
   for (const std::string& name : names) {
     Covariate covariate{name, MatrixXd::Constant(source.rows(), 1, kNaN)};
     Index missing = 0;
@@ -108,7 +110,8 @@ void add_sheet_covariates(const Source& source, Observations& result) {
 void add_texts(const Source& source, Observations& result) {
   std::set<std::string> names;
   for (Index row = 0; row < source.rows(); ++row)
-    for (const auto& [name, text] : source.run(row).labels) names.insert(name);
+    for (const auto& [name, text] : source.run(row).labels)
+      if (!is_made_of_times(name)) names.insert(name);
   for (const std::string& name : names) {
     std::vector<std::string> texts;
     for (Index row = 0; row < source.rows(); ++row) {
@@ -170,9 +173,7 @@ void add_derived_covariates(const Source& source, Observations& result) {
     day.value(row, 0) = std::fmod(source.run(row).start_s, 86400) / 3600;
     order.value(row, 0) = static_cast<double>(row);
   }
-  for (const Covariate& time : {hours, day})
-    if (result.find(time.name) == nullptr) result.covariates.push_back(time);
-  result.covariates.push_back(order);
+  result.covariates.insert(result.covariates.end(), {hours, day, order});
   const Covariate* air = result.find("air_temperature_C");
   if (air == nullptr) return;
   Covariate trend{"air_temperature_rate_K_s", MatrixXd::Zero(n, 1), true, "K/s"};
@@ -329,9 +330,11 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
   add_places(source, result);
   result.slopes.resize(source.rows(), 0);
   result.duration_s = Eigen::VectorXd::Zero(source.rows());
-  for (Index row = 0; row < source.rows(); ++row)
-    if (const RunStatistics* statistics = source.statistics(row))
-      result.duration_s(row) = statistics->elapsed_s(data.info.daq.sample_rate_hz);
+  for (Index row = 0; row < source.rows(); ++row) {
+    const RunStatistics* statistics = source.statistics(row);
+    result.duration_s(row) = statistics != nullptr ? statistics->elapsed_s(data.info.daq.sample_rate_hz)
+                                                   : source.run(row).number(kDuration).value_or(0);
+  }
   add_sheet_covariates(source, result);
   add_texts(source, result);
   add_derived_covariates(source, result);

@@ -4,6 +4,7 @@
 #include "datasets/error.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -29,7 +30,10 @@ void set_response(const TableSource& source, const ObservationChoice& choice, Ob
   result.coefficient = result.coefficient || reduced;
   const std::string_view quantity = unit_from_name(column.unit).quantity;
   result.of_air = own && !reduced && (!column.meaning.empty() || quantity == "power" || quantity == "torque");
-  result.of_no_quantity = quantity == "number" && column.unit != "counts" && column.meaning.empty();
+  constexpr std::array<std::string_view, 8> kOfNoCell = {"number", "time",     "frequency",   "length",
+                                                         "area",   "velocity", "temperature", "angle"};
+  result.of_no_cell =
+      std::ranges::count(kOfNoCell, quantity) > 0 && column.unit != "counts" && column.meaning.empty();
   for (Index r = 0; r < source.count(); ++r) {
     const Observation& row = source.row(r);
     result.value(r, 0) = source.converted(r, column);
