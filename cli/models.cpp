@@ -38,6 +38,7 @@ Json version_json(const StoredModel& stored, bool in_force) {
           {"arguments", stored.provenance.arguments},
           {"baseline", stored.model.baseline},
           {"effects", stored.model.effects()},
+          {"reference", stored.model.reference()},
           {"unit", "N"},
           {"error_before", number_in(explanation, "before", "held_out_rmse")},
           {"error_after", number_in(explanation, "after", "held_out_rmse")},
@@ -67,7 +68,17 @@ void print(const Json& versions) {
                version["in_force"].get<bool>() ? "yes" : ""});
   }
   table.print();
-  fmt::print("\nerrors are of blocks held out; `reduce --model N` goes by another version\n");
+  fmt::print("\n");
+  for (const Json& version : versions) {
+    std::vector<std::string> conditions;
+    if (version.contains("reference"))
+      for (const auto& [name, value] : version["reference"].items())
+        conditions.push_back(fmt::format("{} {:.6g}", name, value.get<double>()));
+    if (!conditions.empty())
+      fmt::print("coefficients by version {} are for {}\n", version["version"].get<int>(),
+                 fmt::join(conditions, ", "));
+  }
+  fmt::print("errors are of blocks held out; `reduce --model N` goes by another version\n");
 }
 
 int run_models(const ModelsOptions& options) {

@@ -213,6 +213,18 @@ Eigen::MatrixXd covariance_of(const Reader& reader, Index size) {
 
 }  // namespace
 
+bool ModelTerm::counts_from_reference(std::size_t k) const {
+  const Rig rig;
+  std::vector<double> elsewhere = reference;
+  elsewhere[k] += 1 + 0.01 * std::abs(elsewhere[k]);
+  std::vector<double> p = parameters;
+  if (p[0] == 0) p[0] = 1;
+  const auto force_N = [&](const std::vector<double>& from) {
+    return effect->force_N({.x = reference, .reference = from, .at_zero = {}, .rig = &rig}, p.data(), 1);
+  };
+  return std::abs(force_N(elsewhere) - force_N(reference)) > 0;
+}
+
 std::string ModelTerm::label() const { return effect->label(rotor, other); }
 
 double ModelCurve::column(std::size_t k, double x) const {
@@ -224,6 +236,14 @@ std::string ModelCurve::label() const {
   const std::string with = times ? times->covariate : place;
   return fmt::format("curve over {}{}{} (empirical)", covariate, with.empty() ? "" : " × " + with,
                      rotor < 0 ? "" : fmt::format(" of rotor {}", rotor + 1));
+}
+
+std::map<std::string, double> ModelVersion::reference() const {
+  std::map<std::string, double> result;
+  for (const ModelTerm& term : terms)
+    for (std::size_t k = 0; k < term.reference.size(); ++k)
+      if (term.counts_from_reference(k)) result[term.effect->covariates[k]] = term.reference[k];
+  return result;
 }
 
 Eigen::VectorXd ModelVersion::parameters() const {

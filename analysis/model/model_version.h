@@ -5,6 +5,7 @@
 #include "analysis/residual/likelihood/curve_basis.h"
 
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,6 +26,8 @@ struct ModelTerm {
   std::string first_run;           // where the effect has a change-point
 
   std::string label() const;  // "creep of rotor 2"
+  /// Whether the effect counts its k-th covariate from what it was typically.
+  bool counts_from_reference(std::size_t k) const;
 };
 
 /// What a slope goes with; `mean` of the product over the runs that it was found in is the baseline's.
@@ -65,7 +68,9 @@ struct ModelVersion {
   /// All terms' parameters, then all curves' coefficients.
   Eigen::VectorXd parameters() const;
   std::vector<std::string> effects() const;  // labels
-  std::string name() const;                  // "version 2 (creep, supply_voltage)"
+  /// The conditions that what is reduced by this model is for: where its effects do nothing.
+  std::map<std::string, double> reference() const;
+  std::string name() const;  // "version 2 (creep, supply_voltage)"
 };
 
 /// "tunnelrig-model/1".

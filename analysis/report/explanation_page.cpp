@@ -328,7 +328,7 @@ std::string explanation_html(const Explanation& explanation, const Observations&
                         {"simulations", settings.simulations},
                         {"most_effects", settings.most_effects}}},
                       {"explanation", Json::parse(explanation_json(explanation))},
-                      {"verdict_in_words", verdict_in_words(explanation.verdict)},
+                      {"verdict_in_words", verdict_in_words(explanation)},
                       {"effects", effects_of(explanation)},
                       {"runs", page.runs()},
                       {"panels", page.panels()},

@@ -133,8 +133,9 @@ Figures residual_figures(const Material& material, double width_mm) {
         fmt::format(
             "What {} gained over the thesis's model. Above: how far each run's C_T is from the mean of its "
             "location, in per cent, before and after. Below: the root mean square error on blocks that the "
-            "search had not seen, with 95 % intervals by resampling the blocks, and the floor below which no "
-            "model can come.",
+            "search had not seen, with 95 % intervals by resampling the blocks, and the floor, which an "
+            "exact "
+            "model would leave.",
             material.settings.model.name())}},
       {}};
 }

@@ -49,7 +49,7 @@ function modelInForce({model}) {
   const error = (e) => `${digits(e.held_out_rmse)} ${bracket(e.held_out_ci95)}`;
   const gain = before && after ?
       ` On blocks held out, the error is ${error(before)} before and ${error(after)}${unitSuffix(unit)} after ` +
-          `(95 % intervals)${known(floor) ? `; no model can come below ${digits(floor)}${unitSuffix(unit)}` : ''}.` :
+          `(95 % intervals)${known(floor) ? `; a model that were exact would leave ${digits(floor)}${unitSuffix(unit)}` : ''}.` :
       '';
   return `${counted(effects.length, 'effect')} adopted: ${effects.join(', ')}.${gain}`;
 }

@@ -13,8 +13,8 @@ std::string explanation_json(const Explanation& explanation);
 /// Plain text, what a person reads on a terminal.
 std::string explanation_text(const Explanation& explanation);
 
-/// "There is structure, but …": what a verdict means.
-std::string verdict_in_words(const std::string& verdict);
+/// "There is structure, but …": what the verdict means, and whether the sealed blocks bear it out.
+std::string verdict_in_words(const Explanation& explanation);
 
 /// Every candidate with formula, parameters, what it needs, and whether these data can test it (null: no
 /// data).

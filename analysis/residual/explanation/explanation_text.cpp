@@ -162,22 +162,29 @@ std::string in_words(const SuspectRow& row) {
 
 }  // namespace
 
-std::string verdict_in_words(const std::string& verdict) {
-  if (verdict == "explained") return "The effects below explain what the model lacked.";
-  if (verdict == "partly_explained")
-    return "The effects below explain a part; structure without a name remains.";
-  if (verdict == "confounded")
-    return "An effect is there, but these data cannot tell which of several it is.";
-  if (verdict == "unknown")
+std::string verdict_in_words(const Explanation& e) {
+  if (e.verdict == "insufficient") return "There are too few blocks, or runs, to say anything.";
+  if (e.verdict == "no_structure") return "Nothing beyond chance was found.";
+  if (e.verdict == "unknown")
     return "There is structure, but no candidate accounts for it: the cause is not known.";
-  if (verdict == "no_structure") return "Nothing beyond chance was found.";
-  return "There are too few blocks, or runs, to say anything.";
+  if (e.verdict == "partly_explained")
+    return "The effects below explain a part; structure without a name remains.";
+  const bool confounded = e.verdict == "confounded";
+  if (e.after.held_out_rmse >= e.before.held_out_rmse)
+    return confounded ? "An effect was found, of which these data cannot tell which of several it is, and "
+                        "which does "
+                        "not predict the sealed blocks better."
+                      : "The effects below were found, but they do not predict the sealed blocks better.";
+  const std::string said = confounded
+                               ? "An effect is there, but these data cannot tell which of several it is"
+                               : "The effects below explain what the model lacked";
+  return said + (e.sealed.beyond_floor ? ", and something else varies in the sealed blocks." : ".");
 }
 
 std::string explanation_text(const Explanation& e) {
   std::string text = fmt::format("{}{}response {}, baseline {}, {} runs in {} block{}\n\n{}: {}\n",
                                  e.campaign, e.campaign.empty() ? "" : ": ", e.response, e.baseline, e.runs,
-                                 e.blocks, e.blocks == 1 ? "" : "s", e.verdict, verdict_in_words(e.verdict));
+                                 e.blocks, e.blocks == 1 ? "" : "s", e.verdict, verdict_in_words(e));
   for (const AdoptedEffect& adopted : e.adopted) text += in_words(adopted);
   for (const UnknownStructure& unknown : e.unknown) text += in_words(unknown, e.unit_suffix());
   text += errors_in_words(e);

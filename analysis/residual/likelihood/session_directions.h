@@ -3,6 +3,8 @@
 
 #include "analysis/residual/likelihood/mixed_model.h"
 
+#include <vector>
+
 namespace tunnelrig {
 
 /// With P_a the inverse covariance V_a⁻¹ less what the baseline absorbs, of session variance a over run
@@ -23,8 +25,13 @@ class SessionDirections {
   Eigen::VectorXd weights(double session_ratio) const;
 
  private:
+  /// uᵀ of each block: blocks × columns.
+  Eigen::MatrixXd in_blocks(const Eigen::Ref<const Eigen::MatrixXd>& columns) const;
+
   Eigen::Index modes_;
-  Eigen::MatrixXd directions_;  // runs × directions, orthonormal columns
+  std::vector<std::vector<Eigen::Index>> blocks_;  // runs of each, no others than the model's
+  Eigen::VectorXd of_blocks_;   // u: of each run, what whitening leaves of its block's indicator
+  Eigen::MatrixXd directions_;  // blocks × directions: of Σ u, what makes e_i once it is projected
   Eigen::VectorXd lambda_;
 };
 

@@ -76,7 +76,7 @@ class Evaluation {
     Sample sample = sample_of(row, channel);
     const double force = force_of(row, channel);
     const double duration = observations_.duration_s(row);
-    if (!term_.effect->within_time() || duration == 0) {
+    if (duration == 0 || !term_.effect->within_time()) {
       put(row, channel, 0, change(changed(sample, force), force), response);
       return;
     }

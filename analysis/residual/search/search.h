@@ -124,6 +124,13 @@ class Search {
   void read_back_terms();
   /// With a new effect in, an older one may be explained better by another: it gives way.
   void swap_weaker();
+  /// Or by another form of itself, which was chosen while the newer was not known: the likelier, where each
+  /// parameter that a form has more must be worth a ratio test.
+  void change_forms();
+  /// What swaps try, beside the model without the term, and what they do then.
+  JointFit fit_beside(const JointFit& without, const Scan& scan, std::size_t way);
+  void put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, const Scan& scan,
+                    std::size_t way);
   double evidence_of(const Scan& scan, const Term& term) const;
   JointFit fit_without(std::size_t t) const { return fit_without(t, observations_); }
   JointFit fit_without(std::size_t t, const Observations& observations) const;

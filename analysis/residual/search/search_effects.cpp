@@ -19,7 +19,6 @@ using Eigen::Index;
 constexpr double kKnownPhysicsWeight = 10;  // theory gives the coefficient: a prior that others lack
 constexpr double kRareWeight = 10;       // stiff blades do not flex, while a Reynolds number all blades have
 constexpr double kTheoryRefused = 0.05;  // p at which the data speak against theory's coefficient
-constexpr double kSwapDecades = 0.7;     // another explains that much better: it takes the place
 constexpr double kClearDecades = 2;      // beyond the one that is accepted: worth a word
 
 double prior_weight(const Term& term, const Observations& observations, std::size_t ways) {
@@ -39,8 +38,10 @@ double prior_weight(const Term& term, const Observations& observations, std::siz
 void Search::add_effects() {
   bool wider = true;
   while (wider) {
-    while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect())
+    while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect()) {
       swap_weaker();
+      change_forms();
+    }
     const Index before = observations_.slopes.cols();
     let_groups_differ(false);
     wider = observations_.slopes.cols() > before;
@@ -268,47 +269,6 @@ double Search::ratio_p(double ratio, const JointFit& fit) const {
 
 void Search::read_back_terms() {
   for (std::size_t t = 0; t < result_.accepted.size(); ++t) result_.accepted[t].term = fit_.model.terms[t];
-}
-
-void Search::swap_weaker() {
-  for (std::size_t t = 0; t + 1 < result_.accepted.size(); ++t) {
-    const Term old = result_.accepted[t].term;
-    if (old.per_group) continue;
-    const JointFit without = fit_without(t);
-    const Scan scan = scan_effects(without);
-    if (scan.order.empty()) continue;
-    const std::size_t best = scan.order[0];
-    if (scan.ways[best].same_way(old) || !(scan.fits[best].evidence > evidence_of(scan, old) + kSwapDecades))
-      continue;
-    const JointFit current = fit_;
-    fit_ = without;
-    JointFit tried = fit_with(scan.ways[best], scan.fits[best].amplitude(0));
-    if (!(tried.variances.log_likelihood > current.variances.log_likelihood) || !tried.at_bound.empty()) {
-      fit_ = current;
-      continue;
-    }
-    NullMaxima maxima = maxima_of(without, scan, ++salt_);
-    const auto rmse_of = [this](const JointFit& fit) { return unseen(fit, fit.variances).rmse(); };
-    fit_ = std::move(tried);
-    const auto place = result_.accepted.begin() + static_cast<std::ptrdiff_t>(t);
-    std::rotate(place, place + 1, result_.accepted.end());  // the new term is the model's last
-    result_.accepted.back().p = maxima.p(scan.fits[best].evidence);
-    result_.accepted.back().gain = rmse_of(without) - rmse_of(fit_);
-    read_back_terms();
-  }
-}
-
-double Search::evidence_of(const Scan& scan, const Term& term) const {
-  double highest = 0;
-  for (std::size_t i = 0; i < scan.ways.size(); ++i)
-    if (scan.ways[i].same_way(term)) highest = std::max(highest, scan.fits[i].evidence);
-  return highest;
-}
-
-JointFit Search::fit_without(std::size_t t, const Observations& observations) const {
-  MeanModel model = fit_.model;
-  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(t));
-  return fit_jointly(observations, model, rows_);
 }
 
 void Search::set_detectable(const Scan& scan) {

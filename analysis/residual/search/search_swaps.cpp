@@ -1,0 +1,99 @@
+// Effects that give way to another one, or to another form of their own, with a newer effect in.
+#include "analysis/residual/search/null_maxima.h"
+#include "analysis/residual/search/search.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+namespace tunnelrig {
+
+namespace {
+
+constexpr double kSwapDecades = 0.7;  // another explains that much better: it takes the place
+/// Of log likelihood, what a parameter must bring: a ratio test of one at 5 %.
+constexpr double kPerParameter = 1.92;
+
+bool is_other_form(const Term& way, const Term& of) {
+  return way.effect != of.effect && way.effect->cause() == of.effect->cause() &&
+         way.effect->covariates == of.effect->covariates && way.rotor == of.rotor && way.other == of.other &&
+         !way.per_group;
+}
+
+double worth(const JointFit& fit) {
+  std::size_t free = 0;
+  for (const Term& term : fit.model.terms)
+    if (!term.effect->has_change_point()) free += term.parameters.size() - (term.at_theory ? 1 : 0);
+  return fit.variances.log_likelihood - kPerParameter * static_cast<double>(free);
+}
+
+}  // namespace
+
+void Search::swap_weaker() {
+  for (std::size_t t = 0; t + 1 < result_.accepted.size(); ++t) {
+    const Term old = result_.accepted[t].term;
+    if (old.per_group) continue;
+    const JointFit without = fit_without(t);
+    const Scan scan = scan_effects(without);
+    if (scan.order.empty()) continue;
+    const std::size_t best = scan.order[0];
+    if (scan.ways[best].same_way(old) || !(scan.fits[best].evidence > evidence_of(scan, old) + kSwapDecades))
+      continue;
+    const JointFit tried = fit_beside(without, scan, best);
+    if (tried.variances.log_likelihood > fit_.variances.log_likelihood && tried.at_bound.empty())
+      put_in_place(t, without, tried, scan, best);
+  }
+}
+
+void Search::change_forms() {
+  for (std::size_t t = 0; t < result_.accepted.size(); ++t) {
+    const Term old = result_.accepted[t].term;
+    const auto other = [&](const Term& way) { return is_other_form(way, old); };
+    if (old.per_group || std::ranges::none_of(ways_, other)) continue;
+    const JointFit without = fit_without(t);
+    const Scan scan = scan_effects(without);
+    std::map<const Effect*, std::size_t> best;  // way of each form, by place in the order
+    for (const std::size_t i : scan.order)
+      if (other(scan.ways[i])) best.emplace(scan.ways[i].effect, i);
+    for (const auto& [effect, i] : best) {
+      const JointFit tried = fit_beside(without, scan, i);
+      if (!(worth(tried) > worth(fit_)) || !tried.at_bound.empty()) continue;
+      put_in_place(t, without, tried, scan, i);
+      break;  // the term is the last now, and another stands in its place
+    }
+  }
+}
+
+JointFit Search::fit_beside(const JointFit& without, const Scan& scan, std::size_t way) {
+  const JointFit current = std::exchange(fit_, without);
+  JointFit tried = fit_with(scan.ways[way], scan.fits[way].amplitude(0));
+  fit_ = current;
+  return tried;
+}
+
+void Search::put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, const Scan& scan,
+                          std::size_t way) {
+  NullMaxima maxima = maxima_of(without, scan, ++salt_);
+  const auto rmse_of = [this](const JointFit& fit) { return unseen(fit, fit.variances).rmse(); };
+  fit_ = tried;
+  const auto place = result_.accepted.begin() + static_cast<std::ptrdiff_t>(t);
+  std::rotate(place, place + 1, result_.accepted.end());  // the new term is the model's last
+  result_.accepted.back().p = maxima.p(scan.fits[way].evidence);
+  result_.accepted.back().gain = rmse_of(without) - rmse_of(fit_);
+  read_back_terms();
+}
+
+double Search::evidence_of(const Scan& scan, const Term& term) const {
+  double highest = 0;
+  for (std::size_t i = 0; i < scan.ways.size(); ++i)
+    if (scan.ways[i].same_way(term)) highest = std::max(highest, scan.fits[i].evidence);
+  return highest;
+}
+
+JointFit Search::fit_without(std::size_t t, const Observations& observations) const {
+  MeanModel model = fit_.model;
+  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+  return fit_jointly(observations, model, rows_);
+}
+
+}  // namespace tunnelrig
