@@ -139,9 +139,9 @@ double degrees_of_freedom(const Observations& observations, const JointFit& fit,
 std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
                                      const NullFit& variances, double dof);
 
-/// Rows that were held out, and are far from what was predicted for them while the rest of their block is not,
-/// in σ by the median: a fit with them in bends to them. Of predictions beyond what a table holds out by name,
-/// or of blocks of one row, nothing says that it is the row that is wrong.
+/// Rows that were held out, and are far from what was predicted for them while the rest of their block is
+/// not, in σ by the median: a fit with them in bends to them. Of predictions beyond what a table holds out by
+/// name, or of blocks of one row, nothing says that it is the row that is wrong.
 std::vector<SuspectRow> apart_from_their_block(const Observations& observations, const HeldOutErrors& sealed);
 
 /// The worst row of a table whose rows stand for themselves, if it is beyond doubt with all that the other
