@@ -247,6 +247,16 @@ TEST(ApplyModel, AStepBeginsAtItsRunWhateverItsNumber) {
   EXPECT_THAT(message_of([&] { corrected(data, model_of({step})); }), HasSubstr("begins at run R9"));
 }
 
+/// Steps and times since the motor's start count from none.
+TEST(ModelVersion, SaysWhichConditionsItsCoefficientsAreFor) {
+  const ModelVersion model =
+      model_of({term("supply_voltage", {0.5}, {14.8}), term("reynolds_number", {0.1}, {5000, 21}),
+                term("propeller_step", {0.1, 2}, {0}), term("motor_warm_up", {0.01, 60}, {100})});
+  EXPECT_THAT(model.reference(),
+              testing::ElementsAre(testing::Pair("air_temperature_C", 21), testing::Pair("speed_rpm", 5000),
+                                   testing::Pair("supply_voltage_V", 14.8)));
+}
+
 TEST(ModelVersion, IsReadAsItWasWritten) {
   ModelTerm step = term("mounting_step", {0.01, 2}, {0}, 3);
   step.first_run = "R3";

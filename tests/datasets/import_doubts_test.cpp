@@ -107,6 +107,16 @@ TEST(ImportDoubts, AColumnThatIsOursButForCapitals) {
   EXPECT_THAT(doubts(kToml, runs("excluded,kinds", {",a"})), IsEmpty());
 }
 
+TEST(ImportDoubts, AConditionThatNothingReads) {
+  EXPECT_THAT(
+      doubts(kToml, runs("run_order", kNumbers)),
+      ElementsAre("runs.csv:1: column run_order is not read: that condition is made of the runs' times"));
+  EXPECT_THAT(
+      doubts(kToml, runs("wall_distance_mm", kNumbers)),
+      ElementsAre("runs.csv:1: column wall_distance_mm is kept as a condition without a meaning: effects "
+                  "read this quantity as wall_distance_R"));
+}
+
 TEST(ImportDoubts, GramsAreNoNewtons) {
   EXPECT_THAT(
       doubts(kToml, runs("fan_rpm", kNumbers, "700,7,7,7")),

@@ -2,6 +2,9 @@
 #include "datasets/locations.h"
 #include "support/message_of.h"
 
+#include <utility>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,6 +56,31 @@ TEST(Runs, NoNumberAmongNumbersIsRefused) {
     EXPECT_THAT(
         refusal(head + "R2,OT,2,S1,2026-03-02T08:10Z,r2.npy," + none + "\n"),
         HasSubstr(std::string("runs.csv:3: column fan_rpm: '") + none + "' is not a finite decimal number"));
+}
+
+TEST(Runs, AKnownQuantityInAnotherUnitIsRefusedInPlaceOfOurs) {
+  const auto with = [](const std::string& columns) {
+    return "run,location,repeat,session,start_utc,raw," + columns +
+           "\nR1,OT,1,S1,2026-03-02T08:00Z,r.npy,1,2\n";
+  };
+  for (const auto& [theirs, ours] : std::vector<std::pair<std::string, std::string>>{
+           {"air_temperature_degF", "air_temperature_C"},
+           {"cell_temperature_F", "cell_temperature_C"},
+           {"air_pressure_mmHg", "air_pressure_Pa"},
+           {"air_pressure", "air_pressure_Pa"},
+           {"relative_humidity_percent", "relative_humidity"},
+           {"speed_Hz", "speed_rpm"},
+           {"tunnel_airspeed_km_h", "tunnel_airspeed_m_s"},
+           {"time_since_motor_start_min", "time_since_motor_start_s"},
+           {"thrust_1_gf", "thrust_1_N"}}) {
+    EXPECT_THAT(refusal(with(theirs + ",fan")),
+                HasSubstr("runs.csv:1: column " + theirs + ": this quantity is read as " + ours));
+  }
+  EXPECT_EQ(parse(with("air_temperature_degF,air_temperature_C")).size(), 1u)
+      << "beside ours it is a covariate";
+  for (const char* other :
+       {"ground_distance_m", "wall_distance_mm", "speed_of_fan", "thrust_1_old", "tilt_rad"})
+    EXPECT_EQ(parse(with(std::string(other) + ",fan")).size(), 1u) << other;
 }
 
 TEST(Runs, DaysAreThoseOfTheCalendar) {

@@ -5,6 +5,7 @@
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -185,6 +186,39 @@ TEST_F(CampaignMeaning, OneRotorHasNoAmplitudesOfTheLocationsOwn) {
   const Explanation e = test::explained(o);
   for (const AdoptedEffect& adopted : e.adopted) EXPECT_FALSE(adopted.term.per_group) << explanation_text(e);
   EXPECT_NO_THROW(adopt(o, e, true));
+}
+
+/// Numbers that a laboratory gave its runs are no order: a step that was found at a run would begin at
+/// another.
+TEST_F(CampaignMeaning, WhatIsMadeOfTheTimesIsReadFromNoColumn) {
+  add_sessions(Tares::kNone, 0);
+  for (tunnelrig::Run& run : data.runs) {
+    run.numbers["run_order"] = -run.repeat;
+    run.numbers["hours_in_session"] = 42;
+    run.labels["hour_of_day"] = "morning";
+  }
+  const Observations o = observe_campaign(data, {});
+  for (const char* name : {"run_order", "hours_in_session", "hour_of_day"})
+    EXPECT_EQ(std::ranges::count(o.covariates, name, &Covariate::name), 1) << name;
+  for (Index row = 0; row < o.rows(); ++row) {
+    EXPECT_EQ(o.find("run_order")->value(row, 0), static_cast<double>(row));
+    EXPECT_LT(o.find("hours_in_session")->value(row, 0), 2.1);
+  }
+}
+
+TEST_F(CampaignMeaning, ThrustsThatCameAsMeansAreOfTheirDuration) {
+  add_sessions(Tares::kNone, 0);
+  for (tunnelrig::Run& run : data.runs) {
+    run.thrust_N = {7, 7.1, 7.2, 7.3};
+    if (run.repeat % 2 == 0) run.numbers["duration_s"] = 60;
+  }
+  data.statistics.clear();
+  data.raw.clear();
+  const Observations o = observe_campaign(data, {});
+  ASSERT_EQ(o.rows(), 168);
+  EXPECT_EQ(o.duration_s(0), 60);
+  EXPECT_EQ(o.duration_s(1), 0);
+  EXPECT_EQ(o.find("duration_s"), nullptr) << "no condition";
 }
 
 /// A height above the ground of a place in the tunnel does not put it in the open.

@@ -464,5 +464,18 @@ TEST_F(ExplainTest, WhatWouldBeDetectedIsFiniteWhereNothingCanBeTested) {
   EXPECT_GT(few.detectable, 0);
 }
 
+TEST(VerdictInWords, SaysWhatTheSealedBlocksDoNotBearOut) {
+  Explanation e{.verdict = "explained", .model = {}};
+  e.before.held_out_rmse = 2;
+  e.after.held_out_rmse = 1;
+  EXPECT_EQ(verdict_in_words(e), "The effects below explain what the model lacked.");
+  e.sealed.beyond_floor = true;
+  EXPECT_THAT(verdict_in_words(e), testing::HasSubstr("something else varies in the sealed blocks"));
+  e.after.held_out_rmse = 2;
+  EXPECT_THAT(verdict_in_words(e), testing::HasSubstr("do not predict the sealed blocks better"));
+  e.verdict = "confounded";
+  EXPECT_THAT(verdict_in_words(e), testing::HasSubstr("does not predict the sealed blocks better"));
+}
+
 }  // namespace
 }  // namespace tunnelrig

@@ -136,5 +136,42 @@ TEST_F(GrossRowsTest, AreFoundInTooFewBlocksForAnEffect) {
   EXPECT_THAT(set_aside(e), UnorderedElementsAreArray(lines)) << explanation_text(e);
 }
 
+/// Rows of held-out blocks, as far from what is predicted for them as `error` says.
+struct HeldOutRows : testing::Test {
+  std::mt19937_64 random{test::seed()};
+  Observations table = test::simulate({.runs_of_block = std::vector<int>(10, 8)}, random);
+  HeldOutErrors sealed;
+
+  HeldOutRows() {
+    table.from_table = true;
+    sealed.rows = table.all_rows();
+    sealed.error = Eigen::MatrixXd::Zero(table.rows(), 1);
+    for (double& error : sealed.error.reshaped()) error = std::normal_distribution<double>(0, 0.01)(random);
+  }
+  std::vector<std::string> apart() const {
+    std::vector<std::string> rows;
+    for (const SuspectRow& row : apart_from_their_block(table, sealed)) rows.push_back(row.row);
+    return rows;
+  }
+};
+
+TEST_F(HeldOutRows, AreWrongWhereTheRestOfTheirBlockIsRight) {
+  EXPECT_THAT(apart(), testing::IsEmpty());
+  sealed.error(17, 0) = 0.9;
+  EXPECT_THAT(apart(), testing::ElementsAre(table.name[17]));
+  table.held_out.assign(80, true);
+  EXPECT_THAT(apart(), testing::IsEmpty()) << "what is held out by name may be beyond any model";
+  table.held_out.clear();
+  table.blocks_are_rows = true;
+  EXPECT_THAT(apart(), testing::IsEmpty()) << "nothing else is in its block";
+}
+
+TEST_F(HeldOutRows, AreNotWrongWhereTheirBlockIsElsewhere) {
+  for (int row = 16; row < 24; ++row) sealed.error(row, 0) = 0.9;
+  EXPECT_THAT(apart(), testing::IsEmpty());
+  sealed.error.middleRows(18, 6).setConstant(0.01);
+  EXPECT_THAT(apart(), testing::IsEmpty()) << "two of eight";
+}
+
 }  // namespace
 }  // namespace tunnelrig
