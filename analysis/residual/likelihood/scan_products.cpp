@@ -33,7 +33,7 @@ ScanProducts::ScanProducts(const MixedModel& model, const std::vector<Components
 }
 
 void ScanProducts::take_out_adopted() {
-  constexpr double kRidge = 1e-12, kLeast = 1e-300;  // a sum of the adopted leaves nothing
+  constexpr double kRidge = 1e-10, kLeast = 1e-300;  // a sum of the adopted leaves nothing
   const Index q = adopted_;
   taken_out_ = products_[0][0].adopted_adopted.completeOrthogonalDecomposition().rank();
   for (Products& products : products_[0]) {

@@ -66,7 +66,8 @@ double StrataFit::weight(std::size_t s, const State& state) const {
 }
 
 Eigen::LDLT<SmallMatrix> StrataFit::factored(SmallMatrix normal) {
-  normal.diagonal().array() *= 1 + 1e-12;
+  constexpr double kRidge = 1e-10;  // well above what rounding leaves of a column that is a sum of others
+  normal.diagonal().array() *= 1 + kRidge;
   normal.diagonal().array() += 1e-300;
   return normal.ldlt();
 }
@@ -118,7 +119,7 @@ Eigen::VectorXd StrataFit::scores(const Data& data, Index set, const State& held
     const auto score = with_data.segment(first, own);
     result(static_cast<Index>(i)) =
         0.5 * (own == 1 ? score(0) * score(0) / std::max(information(0, 0), 1e-300)
-                        : score.dot(information.ldlt().solve(score)));
+                        : score.dot(factored(std::move(information)).solve(score)));
   }
   return result;
 }
