@@ -238,8 +238,12 @@ Sheet parse_csv(std::string_view text, const std::string& file, std::string_view
     if (cells.size() == 1 && trimmed(cells[0]).empty() && sheet.columns.size() > 1) continue;
     if (!free_text.empty()) join_free_text(cells, sheet.columns, free_text);
     if (cells.size() != sheet.columns.size()) {
+      const std::string_view advice = separator_advice(sheet.columns);
       throw InputError::at(file, line, "{} cells where the header has {} columns{}", cells.size(),
-                           sheet.columns.size(), separator_advice(sheet.columns));
+                           sheet.columns.size(),
+                           !advice.empty() || sheet.columns.size() > 1
+                               ? advice
+                               : "; line 1 must be the header: is something else above it?");
     }
     sheet.rows.push_back({std::move(cells), line});
   }

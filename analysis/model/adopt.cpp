@@ -107,7 +107,7 @@ void require_adoptable(const Observations& observations) {
     throw InputError(fmt::format(
         "--adopt: a model corrects the thrusts of a campaign, and this explains {} of {}; without it the "
         "errors "
-        "are the same, and with --adopt-empirical they are with the curves",
+        "are the same, with --adopt-empirical those with the curves",
         observations.response, observations.campaign.empty() ? "a table" : observations.campaign));
 }
 

@@ -88,6 +88,8 @@ TEST(Csv, OtherSeparatorsAreNamed) {
   EXPECT_THAT(missing("g;y;x\na;1,5;0,1\n"),
               HasSubstr("3 cells where the header has 1 columns; the header looks separated by semicolons"));
   EXPECT_THAT(missing("g,x\na,1\n"), testing::EndsWith("the required column y is missing"));
+  EXPECT_THAT(missing("made in May\ng,y\na,1\n"),
+              HasSubstr("t.csv:2: 2 cells where the header has 1 columns; line 1 must be the header"));
 }
 
 TEST(WriteText, KeepsLinksAndDevices) {

@@ -126,7 +126,7 @@ class Search {
   void swap_weaker();
   /// Or by another form of itself, which was chosen while the newer was not known: the likelier, where each
   /// parameter that a form has more must be worth a ratio test.
-  void change_forms();
+  bool change_a_form();
   /// What swaps try, beside the model without the term, and what they do then.
   JointFit fit_beside(const JointFit& without, const Scan& scan, std::size_t way);
   void put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, const Scan& scan,

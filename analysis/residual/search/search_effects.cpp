@@ -40,7 +40,8 @@ void Search::add_effects() {
   while (wider) {
     while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect()) {
       swap_weaker();
-      change_forms();
+      while (change_a_form()) {
+      }
     }
     const Index before = observations_.slopes.cols();
     let_groups_differ(false);

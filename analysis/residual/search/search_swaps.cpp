@@ -45,23 +45,24 @@ void Search::swap_weaker() {
   }
 }
 
-void Search::change_forms() {
+bool Search::change_a_form() {
   for (std::size_t t = 0; t < result_.accepted.size(); ++t) {
     const Term old = result_.accepted[t].term;
     const auto other = [&](const Term& way) { return is_other_form(way, old); };
     if (old.per_group || std::ranges::none_of(ways_, other)) continue;
     const JointFit without = fit_without(t);
     const Scan scan = scan_effects(without);
-    std::map<const Effect*, std::size_t> best;  // way of each form, by place in the order
+    std::map<const Effect*, std::size_t> best;  // way of each form
     for (const std::size_t i : scan.order)
       if (other(scan.ways[i])) best.emplace(scan.ways[i].effect, i);
     for (const auto& [effect, i] : best) {
       const JointFit tried = fit_beside(without, scan, i);
       if (!(worth(tried) > worth(fit_)) || !tried.at_bound.empty()) continue;
       put_in_place(t, without, tried, scan, i);
-      break;  // the term is the last now, and another stands in its place
+      return true;
     }
   }
+  return false;
 }
 
 JointFit Search::fit_beside(const JointFit& without, const Scan& scan, std::size_t way) {
