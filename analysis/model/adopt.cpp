@@ -105,9 +105,8 @@ bool adoptable(const Observations& observations) {
 void require_adoptable(const Observations& observations) {
   if (!adoptable(observations))
     throw InputError(fmt::format(
-        "--adopt: a model corrects the thrusts of a campaign, and this explains {} of {}; without it the "
-        "errors "
-        "are the same, with --adopt-empirical those with the curves",
+        "--adopt: a model corrects the thrusts of a campaign, and this explains {} of {}; without it "
+        "the errors are the same, with --adopt-empirical those with the curves",
         observations.response, observations.campaign.empty() ? "a table" : observations.campaign));
 }
 

@@ -17,8 +17,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Times within a run at which an effect that changes with time is evaluated, as in the fit.
-constexpr int kTimes = 32;
 constexpr int kMostInversions = 200;
 constexpr double kConverged = 1e-12;  // relative change of the last step; the promise is 1e-10
 constexpr double kDifference = 1e-4;  // of derivatives by parameters, in standard uncertainties or relative
@@ -169,11 +167,11 @@ class Forward {
     const double duration_s = observations_.duration_s(row);
     if (!term.effect->within_time() || duration_s == 0) return term.effect->force_N(sample, p, force_N);
     double sum = 0;
-    for (int i = 0; i < kTimes; ++i) {
-      sample.time_s = duration_s * (i + 0.5) / kTimes;
+    for (int i = 0; i < kTimesWithinRun; ++i) {
+      sample.time_s = duration_s * (i + 0.5) / kTimesWithinRun;
       sum += term.effect->force_N(sample, p, force_N);
     }
-    return sum / kTimes;
+    return sum / kTimesWithinRun;
   }
 
   /// What the curve is over. Texts are numbered by the curve's own list; NaN: not in it.

@@ -171,9 +171,8 @@ std::string verdict_in_words(const Explanation& e) {
     return "The effects below explain a part; structure without a name remains.";
   const bool confounded = e.verdict == "confounded";
   if (e.after.held_out_rmse >= e.before.held_out_rmse)
-    return confounded ? "An effect was found, of which these data cannot tell which of several it is, and "
-                        "which does "
-                        "not predict the sealed blocks better."
+    return confounded ? "An effect was found, of which these data cannot tell which of several it is, "
+                        "and which does not predict the sealed blocks better."
                       : "The effects below were found, but they do not predict the sealed blocks better.";
   const std::string said = confounded
                                ? "An effect is there, but these data cannot tell which of several it is"

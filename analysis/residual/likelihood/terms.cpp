@@ -10,25 +10,20 @@
 #include <numbers>
 #include <optional>
 
-#include <fmt/format.h>
-
 namespace tunnelrig {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
-/// Times within a run at which an effect that changes with time is evaluated.
-constexpr int kTimes = 32;
-
-/// cos(π j (t + ½)/kTimes), j = 0 … kShapes, scaled to give mean and cosine coefficients.
+/// cos(π j (t + ½)/kTimesWithinRun), j = 0 … kShapes, scaled to give mean and cosine coefficients.
 const MatrixXd& cosines() {
   static const MatrixXd table = [] {
-    MatrixXd result(kShapes + 1, kTimes);
+    MatrixXd result(kShapes + 1, kTimesWithinRun);
     for (int j = 0; j <= kShapes; ++j)
-      for (int t = 0; t < kTimes; ++t)
-        result(j, t) = (j == 0 ? 1.0 : 2.0) / kTimes * std::cos(std::numbers::pi * j * (t + 0.5) / kTimes);
+      for (int t = 0; t < kTimesWithinRun; ++t)
+        result(j, t) = (j == 0 ? 1.0 : 2.0) / kTimesWithinRun *
+                       std::cos(std::numbers::pi * j * (t + 0.5) / kTimesWithinRun);
     return result;
   }();
   return table;
@@ -82,8 +77,8 @@ class Evaluation {
     }
     std::array<EffectJet, kShapes + 1> coefficient{};
     const std::size_t components = within_ ? response.value.size() : 1;
-    for (int t = 0; t < kTimes; ++t) {
-      sample.time_s = duration * (t + 0.5) / kTimes;
+    for (int t = 0; t < kTimesWithinRun; ++t) {
+      sample.time_s = duration * (t + 0.5) / kTimesWithinRun;
       const EffectJet then = changed(sample, force);
       for (std::size_t j = 0; j < components; ++j)
         coefficient[j] += cosines()(static_cast<Index>(j), t) * then;

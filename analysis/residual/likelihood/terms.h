@@ -9,6 +9,9 @@
 
 namespace tunnelrig {
 
+/// Times within a run at which an effect that changes with time is evaluated.
+inline constexpr int kTimesWithinRun = 32;
+
 /// An effect on all rotors or on one, with its shape parameters set.
 struct Term {
   const Effect* effect = nullptr;
