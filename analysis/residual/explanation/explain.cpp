@@ -2,6 +2,7 @@
 #include "analysis/residual/explanation/explanation_parts.h"
 
 #include <algorithm>
+#include <functional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -127,19 +128,25 @@ bool baseline_does_better(const Explanation& explanation) {
 }
 
 Refuted refuted(const Explanation& explanation, const Observations& observations) {
-  Refuted result;
+  std::vector<const AdoptedEffect*> against;
   bool refutable = false;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     refutable = refutable || !adopted.term.effect->theory_only;
-    const std::string why = refutation(adopted, observations);
-    if (why.empty()) continue;
-    result.terms.push_back(adopted.term);
-    result.why.push_back(why);
-    result.at_bound |= adopted.at_bound;
-    result.structure |= adopted.bends_away || adopted.anywhere;
+    if (!refutation(adopted, observations).empty()) against.push_back(&adopted);
   }
-  result.all = result.terms.empty() && refutable &&
-               (curves_do_better(explanation) || baseline_does_better(explanation));
+  // With the wrong one of two equals in, the sealed runs are far from all that was found, and no other effect
+  // is seen beside it: what has equals goes first, and the rest is judged beside the one that is left.
+  const auto has_equals = [](const AdoptedEffect* adopted) { return !adopted->confounded_with.empty(); };
+  if (std::ranges::any_of(against, has_equals)) std::erase_if(against, std::not_fn(has_equals));
+  Refuted result;
+  for (const AdoptedEffect* adopted : against) {
+    result.terms.push_back(adopted->term);
+    result.why.push_back(refutation(*adopted, observations));
+    result.at_bound |= adopted->at_bound;
+    result.structure |= adopted->bends_away || adopted->anywhere;
+  }
+  result.all =
+      against.empty() && refutable && (curves_do_better(explanation) || baseline_does_better(explanation));
   return result;
 }
 
