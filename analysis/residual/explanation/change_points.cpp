@@ -1,5 +1,6 @@
 // Where a step lies.
 #include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/search/group_amplitudes.h"
 #include "analysis/residual/search/step_profile.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 namespace tunnelrig {
 
-MeanModel with_change_points_of_all(const Observations& observations, MeanModel model,
+MeanModel with_change_points_of_all(Observations& observations, MeanModel model,
                                     std::vector<ChangePoint>& result) {
   const std::vector<int> rows = observations.all_rows();
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
@@ -15,6 +16,8 @@ MeanModel with_change_points_of_all(const Observations& observations, MeanModel 
     if (!k) continue;
     const StepProfile profile = step_profile(observations, model, t, rows);
     if (profile.empty()) continue;
+    if (model.terms[t].per_group && profile.likeliest() != first_row_of(model.terms[t]))
+      model = fit_with_step_at(profile.likeliest(), observations, std::move(model), t, rows).model;
     model.terms[t].parameters[*k] = profile.likeliest();
     result.push_back({t, *k, static_cast<double>(profile.lowest()), static_cast<double>(profile.highest())});
   }

@@ -112,6 +112,7 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
       const Covariate &first = observations.covariates[a], &second = observations.covariates[b];
       if ((first.derived && second.derived) || !first.labels.empty() || !second.labels.empty()) continue;
       if (first.value.array().isNaN().any() || second.value.array().isNaN().any()) continue;
+      if (is_constant(first) || is_constant(second)) continue;  // said already
       const double together = correlation(first, second);
       if (std::abs(together) < 0.999) continue;
       explanation.warnings.push_back(

@@ -70,12 +70,30 @@ std::vector<Drawn> drawn_levels(const Curve& curve) {
   return points;
 }
 
-/// From x = `from` to `to`, of a curve over `low` to `high`.
-std::vector<Drawn> drawn_curve(const Curve& curve, double from, double to, double low, double high) {
-  constexpr int kPoints = 25;
+/// From x = `from` to `to`, evenly; where the rows have few values (`seen`, ascending) at these, and nowhere
+/// further from all of them than the next of the even ones: a bend may have any height in between.
+std::vector<double> places_to_draw(const std::vector<double>& seen, double from, double to) {
+  constexpr std::size_t kPoints = 25;
+  const double step = (to - from) / (kPoints - 1);
+  std::vector<double> places;
+  if (seen.size() < kPoints)
+    for (const double x : seen)
+      if (x >= from && x <= to) places.push_back(x);
+  if (places.size() > 1) return places;
+  places.clear();
+  for (std::size_t p = 0; p < kPoints; ++p) {
+    const double x = p + 1 < kPoints ? from + static_cast<double>(p) * step : to;
+    const auto next = std::ranges::lower_bound(seen, x - step);
+    if (seen.empty() || (next != seen.end() && *next <= x + step)) places.push_back(x);
+  }
+  return places;
+}
+
+/// Of a curve over `low` to `high`.
+std::vector<Drawn> drawn_curve(const Curve& curve, const std::vector<double>& places, double low,
+                               double high) {
   std::vector<Drawn> points;
-  for (int p = 0; p < kPoints; ++p) {
-    const double x = from + static_cast<double>(p) / (kPoints - 1) * (to - from);
+  for (const double x : places) {
     points.push_back({x, VectorXd(static_cast<Index>(curve.columns.size()))});
     for (std::size_t b = 0; b < curve.columns.size(); ++b)
       points.back().columns(static_cast<Index>(b)) = tilted_column(curve.shape, curve.tilt, b, x, low, high);
@@ -83,6 +101,67 @@ std::vector<Drawn> drawn_curve(const Curve& curve, double from, double to, doubl
       points.back().columns.array() -= curve_straight(curve.shape, curve.x.mean(), low, high);
   }
   return points;
+}
+
+/// Of each of `columns`, what neither the group's constant and slopes nor `others` can make: rows × columns,
+/// channel below channel.
+MatrixXd beside_others(const Observations& observations, const std::vector<int>& rows,
+                       const std::vector<Components>& columns, const std::vector<Components>& others) {
+  const Index n = static_cast<Index>(rows.size()), c = observations.channels();
+  const auto k = static_cast<Index>(columns.size()), all = k + static_cast<Index>(others.size());
+  std::map<int, std::vector<int>> places;
+  for (Index r = 0; r < n; ++r)
+    places[observations.group[static_cast<std::size_t>(rows[static_cast<std::size_t>(r)])]].push_back(
+        static_cast<int>(r));
+  MatrixXd stacked(n * c, all);
+  for (Index b = 0; b < all; ++b) {
+    const Components& column =
+        b < k ? columns[static_cast<std::size_t>(b)] : others[static_cast<std::size_t>(b - k)];
+    stacked.col(b) = column[0](rows, Eigen::all).reshaped();
+  }
+  const MatrixXd slopes = observations.slopes(rows, Eigen::all);
+  for (const auto& [group, own] : places) {
+    MatrixXd baseline(static_cast<Index>(own.size()), 1 + slopes.cols());
+    baseline << VectorXd::Ones(baseline.rows()), slopes(own, Eigen::all);
+    const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(baseline);
+    for (Index channel = 0; channel < c; ++channel) {
+      auto part = stacked.middleRows(channel * n, n);
+      const MatrixXd given = part(own, Eigen::all);
+      part(own, Eigen::all) = given - baseline * solver.solve(given);
+    }
+  }
+  const MatrixXd left = stacked.rightCols(all - k);
+  if (left.cols() == 0) return stacked;
+  return stacked.leftCols(k) - left * left.completeOrthogonalDecomposition().solve(stacked.leftCols(k));
+}
+
+/// What of a curve the baseline or the rest of the model can do as well may be of any size in the fit, and be
+/// taken back by them. Of the curves that fit about as well the smallest is meant: its values have a normal
+/// prior of twice the size of what it alone can do. Changes amplitude and covariance.
+void keep_to_its_own_size(const Observations& observations, const std::vector<int>& rows,
+                          const std::vector<Components>& others, const Curve& curve, VectorXd& amplitude,
+                          MatrixXd& covariance) {
+  constexpr double kWider = 2;
+  const MatrixXd own = beside_others(observations, rows, curve.columns, others);
+  const auto k = static_cast<Index>(curve.columns.size());
+  MatrixXd whole(own.rows(), k);
+  for (Index b = 0; b < k; ++b)
+    whole.col(b) = curve.columns[static_cast<std::size_t>(b)][0](rows, Eigen::all).reshaped();
+  whole.rowwise() -= whole.colwise().mean().eval();
+  const double own_square = (own * amplitude).squaredNorm();
+  if (!(own_square > 0)) return;
+  const MatrixXd precision = whole.transpose() * whole / (kWider * kWider * own_square);
+  const Eigen::PartialPivLU<MatrixXd> shrink(MatrixXd::Identity(k, k) + covariance * precision);
+  amplitude = shrink.solve(amplitude).eval();
+  covariance = shrink.solve(covariance).eval();
+}
+
+std::vector<double> values_seen(const Curve& curve, const std::vector<int>& rows) {
+  const MatrixXd x = curve.x(rows, Eigen::all);
+  std::vector<double> seen(x.data(), x.data() + x.size());
+  std::ranges::sort(seen);
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  return seen;
 }
 
 /// Of a smooth curve two columns more than its data asked for: what it then lacks is less than its band.
@@ -162,19 +241,23 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   const Components y = difference(response_components(observations), fit.linear.offset);
   const AmplitudeFit amplitudes = fit_amplitudes(observations, y, columns, fit.variances, rows);
   const auto k = static_cast<Index>(curve.columns.size());
-  const VectorXd amplitude = amplitudes.amplitude.tail(k);
-  const MatrixXd covariance = amplitudes.covariance.bottomRightCorner(k, k);
+  VectorXd amplitude = amplitudes.amplitude.tail(k);
+  MatrixXd covariance = amplitudes.covariance.bottomRightCorner(k, k);
   const double scale = observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
   const bool within = found.curve.x.size() == 0;
+  if (!within)
+    keep_to_its_own_size(observations, rows, {columns.begin(), columns.end() - k}, curve, amplitude,
+                         covariance);
   const double duration_s = observations.duration_s.maxCoeff();
   std::vector<std::vector<Drawn>> pieces;
   if (result.levels)
     pieces.push_back(drawn_levels(curve));
   else if (within)
-    pieces.push_back(drawn_curve(curve, 0, duration_s, 0, duration_s));
+    pieces.push_back(drawn_curve(curve, places_to_draw({}, 0, duration_s), 0, duration_s));
   else
     for (const Stretch& stretch : stretches_of(observations, rows, curve))
-      pieces.push_back(drawn_curve(curve, stretch.low, stretch.high, curve.low, curve.high));
+      pieces.push_back(drawn_curve(curve, places_to_draw(values_seen(curve, rows), stretch.low, stretch.high),
+                                   curve.low, curve.high));
   for (std::vector<Drawn>& points : pieces) {
     if (!result.levels) take_out_baseline(observations, rows, curve, points);
     if (!curve.strength) centre(points);

@@ -2,6 +2,8 @@
 #include "analysis/residual/explanation/explanation_parts.h"
 #include "analysis/residual/likelihood/scores.h"
 
+#include <algorithm>
+
 namespace tunnelrig {
 namespace {
 
@@ -32,11 +34,12 @@ void report_adopted(const Observations& observations, const Attribution& found, 
   }
 }
 
-/// Change-points as the runs are numbered, where the search counted rows.
+/// Change-points as the runs are numbered, where the search counted rows; where they are counted anew in
+/// each group, numbers do not say which row it is, and the rows are counted from 0.
 void number_change_points(const Observations& observations, const std::vector<ChangePoint>& change_points,
                           Explanation& explanation) {
   const Covariate* order = observations.find("run_order");
-  if (order == nullptr) return;
+  if (order == nullptr || !std::ranges::is_sorted(order->value.col(0))) return;
   for (const ChangePoint& point : change_points) {
     ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
     for (double* place : {&estimate.value, &estimate.low, &estimate.high})
@@ -64,7 +67,9 @@ void report_structure_left(const StructureLeft& left, const Observations& observ
 void estimate_on_all(const Models& models, const Observations& observations,
                      const std::vector<const Effect*>& effects, const SearchSettings& settings,
                      Explanation& explanation) {
-  const auto& [wide, alone, baseline, found] = models;
+  const Fitted& baseline = models.baseline;
+  Attribution found = models.found;
+  Observations& wide = found.observations;
   const std::vector<int> rows = observations.all_rows();
   std::vector<ChangePoint> change_points;
   const JointFit whole =

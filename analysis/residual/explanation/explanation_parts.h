@@ -92,8 +92,9 @@ struct ChangePoint {
   double low, high;  // 95 %
 };
 
-/// Steps were sought by the open blocks; all runs tell where they lie.
-MeanModel with_change_points_of_all(const Observations& observations, MeanModel model,
+/// Steps were sought by the open blocks; all runs tell where they lie. The columns of those with amplitudes
+/// of the groups' own are made anew there.
+MeanModel with_change_points_of_all(Observations& observations, MeanModel model,
                                     std::vector<ChangePoint>& result);
 
 /// Sealed runs between the open ones on either side of a step, before or behind it: the open ones do not say

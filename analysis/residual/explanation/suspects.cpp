@@ -210,11 +210,42 @@ std::vector<SuspectRow> wild_runs(const Observations& observations) {
   return result;
 }
 
+namespace {
+
+/// Gross rows of a table that share a value of a condition, off to the same side, and that most other rows of
+/// that value are like: what they repeat is no slip of the hand.
+bool repeat_each_other(const Observations& observations, const SuspectRow& row,
+                       const std::vector<SuspectRow>& gross) {
+  constexpr double kSame = 0.02;  // of the condition's range
+  constexpr std::ptrdiff_t kFewest = 3;
+  const auto place_of = [&](const SuspectRow& of) {
+    return static_cast<Index>(std::ranges::find(observations.name, of.row) - observations.name.begin());
+  };
+  return std::ranges::any_of(observations.covariates, [&](const Covariate& covariate) {
+    if (covariate.derived || covariate.per_channel() || covariate.name == "run_order" ||
+        !covariate.value.allFinite())
+      return false;
+    const double least = kSame * (covariate.value.maxCoeff() - covariate.value.minCoeff());
+    const double own = covariate.value(place_of(row), 0);
+    const auto is_near = [&](double value) { return std::abs(value - own) <= least; };
+    const std::ptrdiff_t near = std::ranges::count_if(covariate.value.col(0), is_near);
+    const std::ptrdiff_t alike = std::ranges::count_if(gross, [&](const SuspectRow& other) {
+      return is_near(covariate.value(place_of(other), 0)) && row.studentised * other.studentised > 0;
+    });
+    return alike >= kFewest && 2 * alike > near && near < observations.rows() / 2;
+  });
+}
+
+}  // namespace
+
 std::vector<SuspectRow> gross_rows(const Observations& observations,
                                    const std::vector<SuspectRow>& suspects) {
-  std::vector<SuspectRow> result;
+  std::vector<SuspectRow> gross;
   for (const SuspectRow& row : suspects)
-    if (row.apart || std::abs(row.studentised) > gross_beyond(observations)) result.push_back(row);
+    if (row.apart || std::abs(row.studentised) > gross_beyond(observations)) gross.push_back(row);
+  std::vector<SuspectRow> result;
+  for (const SuspectRow& row : gross)
+    if (!observations.from_table || !repeat_each_other(observations, row, gross)) result.push_back(row);
   return result;
 }
 

@@ -1,7 +1,9 @@
 #include "analysis/residual/likelihood/candidates.h"
 
 #include "analysis/residual/likelihood/joint_fit.h"
+#include "analysis/residual/observations/condition_values.h"
 #include "analysis/residual/observations/previous_run.h"
+#include "datasets/units.h"
 
 #include <algorithm>
 #include <array>
@@ -91,21 +93,34 @@ bool shows_zero_offset(const Observations& observations) {
          (is_made_c_t(observations) || thrust);
 }
 
+/// Powers go with its cube, and what is neither a force nor read by a cell has no such theory.
+bool goes_with_speed_squared(const Observations& observations) {
+  if (!observations.from_table) return true;
+  return !observations.of_no_cell && unit_from_name(observations.unit).quantity != "power";
+}
+
 }  // namespace
 
 Testability testability(const Effect& effect, const Observations& observations) {
   Testability result;
+  bool varies = effect.covariates.empty();
   for (const std::string& name : effect.covariates) {
     const Covariate* covariate = observations.find(name);
     if (covariate == nullptr) {
       result.missing.push_back(name);
       continue;
     }
+    varies |= !is_constant(*covariate);
     if (const auto why = observations.not_usable.find(name); why != observations.not_usable.end())
       result.reason = name + " is " + why->second;
     if (!covariate->labels.empty()) result.reason = name + " is a column of texts";
     if (covariate->derived && covariate->value.isZero(0)) result.reason = name + " is 0 in every run";
   }
+  // What is left then goes with the force alone, which says nothing of the condition.
+  if (observations.from_table && !varies && result.missing.empty())
+    result.reason =
+        fmt::format("{} the same in every row",
+                    effect.covariates.size() == 1 ? effect.covariates[0] + " is" : "its conditions are");
   // With the standard's air nothing changes, and a gradient is the drift of zero by another name.
   if ((effect.name == "air_temperature" || effect.name == "temperature_gradient") &&
       observations.assumed.contains("air_temperature_C"))
@@ -138,6 +153,11 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason = "the response has one sign";
   if (observations.coefficient && effect.name == "rotor_speed")
     result.reason = "the measured speed is part of the response";
+  else if (effect.name == "rotor_speed" && !goes_with_speed_squared(observations))
+    result.reason =
+        "only forces, torques and what a cell reads of them go with the square of the speed: give the "
+        "response "
+        "its unit";
   if (observations.coefficient && !is_made_c_t(observations) &&
       (effect.name == "nonlinearity" || effect.name == "bidirectional"))
     result.reason = "a coefficient is no force that a cell has read";

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
@@ -52,19 +53,58 @@ void add_covariates(const TableSource& source, Observations& result) {
   add("air_temperature_C", "°C", [&](Index r) { return source.row(r).air_temperature_C; });
 }
 
-/// By run_order, where every row has one: steps and what depends on the row before go by place.
-void sort_by_order(TableSource& source) {
+/// Of each row in use, where all have one.
+std::optional<std::vector<double>> run_orders(const TableSource& source) {
   for (const TableColumn& column : source.table.schema.covariates) {
     if (column.name() != "run_order") continue;
-    std::map<std::size_t, double> number;
+    std::vector<double> result;
     for (const std::size_t row : source.rows) {
       const auto value = source.table.sheet.number(row, column.column);
-      if (!value) return;
-      number[row] = *value;
+      if (!value) return {};
+      result.push_back(*value);
     }
-    std::stable_sort(source.rows.begin(), source.rows.end(),
-                     [&](std::size_t a, std::size_t b) { return number[a] < number[b]; });
+    return result;
   }
+  return {};
+}
+
+/// Whether numbers of several groups or blocks are the same, and fall nowhere but from one to the next.
+bool is_counted_anew(const TableSource& source, const std::vector<double>& order) {
+  const TableSchema& schema = source.table.schema;
+  const bool named_blocks = !schema.bins && schema.blocks != "rows";
+  std::vector<std::pair<std::string, std::string>> owner;  // group and block
+  for (Index r = 0; r < source.count(); ++r)
+    owner.emplace_back(
+        source.row(r).group,
+        named_blocks ? source.table.sheet.text(source.rows[static_cast<std::size_t>(r)], schema.blocks) : "");
+  std::map<double, std::size_t> last;
+  bool shared = false, falls = false;
+  for (std::size_t r = 0; r < order.size(); ++r) {
+    const auto [seen, fresh] = last.emplace(order[r], r);
+    shared |= !fresh && owner[seen->second] != owner[r];
+    if (r == 0 || order[r] >= order[r - 1]) continue;
+    if (owner[r] == owner[r - 1]) return false;
+    falls = true;
+  }
+  return shared && falls;
+}
+
+/// By run_order: steps and what depends on the row before go by place.
+void sort_by_order(TableSource& source, Observations& result) {
+  const auto order = run_orders(source);
+  if (!order) return;
+  if (is_counted_anew(source, *order)) {
+    result.left_out.emplace_back(
+        "run_order is counted anew in each group or block: rows are taken to follow each other as in the "
+        "file; where those of one number were read at one time, sort the file by it");
+    return;
+  }
+  std::vector<std::size_t> place(order->size());
+  std::iota(place.begin(), place.end(), 0U);
+  std::ranges::stable_sort(place, {}, [&](std::size_t r) { return (*order)[r]; });
+  std::vector<std::size_t> sorted;
+  for (const std::size_t r : place) sorted.push_back(source.rows[r]);
+  source.rows = std::move(sorted);
 }
 
 int index_in(std::map<std::string, int>& known, std::vector<std::string>& names, const std::string& name) {
@@ -215,14 +255,20 @@ std::string keep_as_covariate(const TableSource& source, const std::string& colu
   return column;
 }
 
-/// A table's rows have an order where a condition says so.
+/// A table's rows have an order where a condition says so. Where groups share its numbers, the row before is
+/// that of the own group: which other was loaded before it is not known.
 void set_previous(Observations& result) {
-  if (result.find("run_order") == nullptr || result.not_usable.contains("run_order")) return;
-  std::map<int, int> last;  // of each block
+  const Covariate* order = result.find("run_order");
+  if (order == nullptr || result.not_usable.contains("run_order")) return;
+  std::map<double, std::set<int>> groups;  // of each number
+  for (std::size_t row = 0; row < result.previous.size(); ++row)
+    groups[order->value(static_cast<Index>(row), 0)].insert(result.group[row]);
+  const bool shared = std::ranges::any_of(groups, [](const auto& of) { return of.second.size() > 1; });
+  std::map<std::pair<int, int>, int> last;  // of each block, and of each group where these share numbers
   for (std::size_t row = 0; row < result.previous.size(); ++row) {
-    const int block = result.blocks_are_rows ? 0 : result.block[row];
-    if (const auto before = last.find(block); before != last.end()) result.previous[row] = before->second;
-    last[block] = static_cast<int>(row);
+    const std::pair own{result.blocks_are_rows ? 0 : result.block[row], shared ? result.group[row] : 0};
+    if (const auto before = last.find(own); before != last.end()) result.previous[row] = before->second;
+    last[own] = static_cast<int>(row);
   }
 }
 
@@ -276,7 +322,7 @@ Observations observe_table(const ObservationTable& table, const ObservationChoic
   Observations result;
   result.campaign = table.schema.name;
   TableSource source = used_rows(table, choice, result);
-  sort_by_order(source);
+  sort_by_order(source, result);
   set_belonging(source, result);
   check_groups(table.schema, result);
   set_response(source, choice, result);

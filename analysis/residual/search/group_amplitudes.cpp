@@ -53,6 +53,44 @@ Index place_among_own(const MeanModel& model, std::size_t t) {
                        [](const Term& term) { return term.per_group; });
 }
 
+Observations without_own(const Observations& observations, const MeanModel& model, std::size_t t) {
+  const auto without = [](const MatrixXd& columns, Index column) {
+    MatrixXd result(columns.rows(), columns.cols() - 1);
+    result << columns.leftCols(column), columns.rightCols(columns.cols() - column - 1);
+    return result;
+  };
+  const Index k = place_among_own(model, t);
+  Observations fewer = observations;
+  fewer.slopes = without(observations.slopes, observations.first_own_slope() + k);
+  fewer.beyond = without(observations.beyond, k);
+  return fewer;
+}
+
+std::vector<Components> columns_by_group(const Components& column, const Observations& observations,
+                                         const std::vector<int>& groups, const MixedModel& mixed) {
+  std::vector<Components> result;
+  for (const int group : groups) {
+    Components own = column;
+    for (Index row = 0; row < observations.rows(); ++row)
+      if (observations.group[static_cast<std::size_t>(row)] != group)
+        for (MatrixXd& component : own) component.row(row).setZero();
+    if (mixed.sees(own)) result.push_back(std::move(own));
+  }
+  return result;
+}
+
+JointFit fit_with_step_at(int row, Observations& observations, MeanModel model, std::size_t t,
+                          const std::vector<int>& rows) {
+  const MatrixXd predicted = predict_response(observations, model, rows);
+  Term& step = model.terms[t];
+  step.parameters[step.effect->change_point().value()] = row;
+  const Index k = place_among_own(model, t);
+  observations.slopes.col(observations.first_own_slope() + k) =
+      respond(step, observations, predicted).derivative[0][0];
+  observations.beyond.col(k).setZero();
+  return fit_in_turns(observations, model, rows);
+}
+
 JointFit fit_in_turns(Observations& observations, const MeanModel& model, const std::vector<int>& rows) {
   constexpr int kMostTurns = 10;
   constexpr double kSettled = 1e-4;  // of what the effect does

@@ -34,8 +34,19 @@ OwnResponse respond_in_groups(Term term, const Eigen::VectorXd& amplitude, const
 /// Of the columns of effects with amplitudes of the groups' own, which one is term t's: from 0.
 Eigen::Index place_among_own(const MeanModel& model, std::size_t t);
 
+/// The data without the column of term t.
+Observations without_own(const Observations& observations, const MeanModel& model, std::size_t t);
+
+/// A candidate's columns, each in one of `groups` alone; without those that `mixed` does not see.
+std::vector<Components> columns_by_group(const Components& column, const Observations& observations,
+                                         const std::vector<int>& groups, const MixedModel& mixed);
+
 /// A joint fit where such effects do what their formulas say at the amplitudes that are found, on forces that
 /// they have not changed themselves: slopes and `beyond` of the observations are set to it.
 JointFit fit_in_turns(Observations& observations, const MeanModel& model, const std::vector<int>& rows);
+
+/// The same, with term t a step that begins at another row.
+JointFit fit_with_step_at(int row, Observations& observations, MeanModel model, std::size_t t,
+                          const std::vector<int>& rows);
 
 }  // namespace tunnelrig

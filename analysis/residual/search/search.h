@@ -82,8 +82,10 @@ class Search {
   /// where another name does as well for all groups alike.
   std::optional<double> gain_of(const InGroups& own, bool before_others) const;
   void take(InGroups own);
-  /// The newest effect with an amplitude of each group's own, where the data ask for it.
-  void let_groups_differ(bool before_others);
+  /// Effect t with an amplitude of each group's own, where the data ask for it; it is the newest then.
+  bool let_groups_differ(std::size_t t, bool before_others);
+  /// The first of the effects, the newest first, for which they do.
+  bool let_any_differ();
   /// An effect that is nothing on the whole, because groups have it with either sign.
   bool accept_in_groups(const Term& way, double p);
   /// In place of a candidate with amplitudes of the groups' own: the same effect alike in all, if α lets it
@@ -98,7 +100,7 @@ class Search {
   /// Whether it is one of the measured speed, of which the model does not have the square.
   bool lacks_speed_squared(const Term& term) const;
   /// Of a term that is a step, counted from the newest (1): from the run on where it is likeliest.
-  JointFit at_best_run(JointFit fit, std::size_t from_newest) const;
+  JointFit at_best_run(JointFit fit, std::size_t from_newest);
   /// All steps, where a curve is new that was a part of the scatter when they were placed.
   void place_steps();
   // several of which none can be seen alone: search_several.cpp
@@ -112,7 +114,8 @@ class Search {
   bool may_be_another(const std::vector<Term>& terms, const std::vector<Term>& left_out,
                       const JointFit& all) const;
   bool accept_together(const Scan& scan, std::size_t i, double p);
-  /// Whether a course that is straight or bends once over the order of runs does as well as the step.
+  /// Whether a course that is straight or bends once over the order of runs does as well as the step, or a
+  /// bend of the baseline's own law.
   bool is_gradual(const std::vector<Term>& steps, const NullFit& variances,
                   const CrossValidation& with_steps) const;
   /// Of the runs' means within the fit, and its degrees of freedom.

@@ -43,9 +43,7 @@ void Search::add_effects() {
       while (change_a_form()) {
       }
     }
-    const Index before = observations_.slopes.cols();
-    let_groups_differ(false);
-    wider = observations_.slopes.cols() > before;
+    wider = let_any_differ();
   }
 }
 
@@ -211,7 +209,7 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
                                 .confounded = {}});
     fit_ = at_best_run(std::move(fit), 1);
     read_back_terms();
-    let_groups_differ(true);
+    let_groups_differ(result_.accepted.size() - 1, true);
     round.outcome += "accepted " + result_.accepted.back().term.label();
     return true;
   }

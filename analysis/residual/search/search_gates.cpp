@@ -1,4 +1,5 @@
 // What a candidate beyond chance must not be, to get its name.
+#include "analysis/residual/search/group_amplitudes.h"
 #include "analysis/residual/search/search.h"
 #include "analysis/residual/search/step_profile.h"
 
@@ -62,15 +63,34 @@ bool Search::is_gradual(const std::vector<Term>& steps, const NullFit& variances
         cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
     if (compare(with_trend, with_steps).mean <= 0) return true;
   }
-  return false;
+  // That the line or power law of the baseline holds all along is an assumption (a wing stalls).
+  return std::ranges::any_of(curves_, [&](const Curve& curve) {
+    if (observations_.baseline_over.empty() || !is_over(curve, {observations_.baseline_over}) ||
+        curve.strength || curve.rotor >= 0)
+      return false;
+    std::vector<Components> with_curve = fit_.linear.columns;
+    with_curve.insert(with_curve.end(), curve.columns.begin(), curve.columns.end());
+    return !compare(cross_validate(observations_, difference(y_, fit_.linear.offset), with_curve, variances,
+                                   rows_),
+                    with_steps)
+                .told_apart();
+  });
 }
 
-JointFit Search::at_best_run(JointFit fit, std::size_t from_newest) const {
+JointFit Search::at_best_run(JointFit fit, std::size_t from_newest) {
   const std::size_t t = fit.model.terms.size() - from_newest;
-  Term& step = fit.model.terms[t];
+  const Term& step = fit.model.terms[t];
   if (!step.effect->has_change_point()) return fit;
   const StepProfile profile = step_profile(observations_, fit.model, t, rows_);
   if (profile.empty() || profile.likeliest() == first_row_of(step)) return fit;
+  if (step.per_group) {
+    Observations moved = observations_;
+    JointFit there = fit_with_step_at(profile.likeliest(), moved, fit.model, t, rows_);
+    if (there.variances.log_likelihood <= fit.variances.log_likelihood) return fit;
+    observations_ = std::move(moved);
+    make_models();
+    return there;
+  }
   MeanModel moved = fit.model;
   moved.terms[t].parameters[step.effect->change_point().value()] = profile.likeliest();
   JointFit there = fit_jointly(observations_, moved, rows_);

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
 namespace tunnelrig {
@@ -32,22 +31,17 @@ Search::Scan Search::scan_effects_and_groups(const JointFit& base) const {
 
 void Search::add_group_ways(Scan& scan) const {
   constexpr std::size_t kMostGroups = 24;
-  std::set<int> groups;
-  for (const int row : rows_) groups.insert(observations_.group[static_cast<std::size_t>(row)]);
+  std::vector<int> groups;
+  for (const auto& [group, rows] : rows_of_each(observations_.group, rows_)) groups.push_back(group);
   if (groups.size() < 2 || groups.size() > kMostGroups) return;
   const std::size_t alike = scan.ways.size();
   for (std::size_t i = 0; i < alike; ++i) {
     const auto& parameters = scan.ways[i].effect->parameters;
     if (parameters.size() > 1 || parameters[0].theory || parameters[0].lower >= 0 || parameters[0].upper <= 0)
       continue;
-    Candidate own{.columns = {}, .sign = 0, .weight = kWeightInGroups};
-    for (const int group : groups) {
-      Components column = scan.candidates[i].columns[0];
-      for (Index row = 0; row < observations_.rows(); ++row)
-        if (observations_.group[static_cast<std::size_t>(row)] != group)
-          for (Eigen::MatrixXd& component : column) component.row(row).setZero();
-      if (mixed_->sees(column)) own.columns.push_back(std::move(column));
-    }
+    Candidate own{.columns = columns_by_group(scan.candidates[i].columns[0], observations_, groups, *mixed_),
+                  .sign = 0,
+                  .weight = kWeightInGroups};
     if (own.columns.size() < 2) continue;
     scan.ways.push_back(scan.ways[i]);
     scan.ways.back().per_group = true;
@@ -91,19 +85,38 @@ std::optional<double> Search::gain_of(const InGroups& own, bool before_others) c
 void Search::take(InGroups own) {
   observations_ = std::move(own.observations);
   make_models();
-  fit_ = std::move(own.fit);
+  fit_ = at_best_run(std::move(own.fit), 1);
   read_back_terms();
 }
 
-void Search::let_groups_differ(bool before_others) {
-  if (!observations_.from_table || observations_.groups() < 2 || result_.accepted.empty()) return;
-  const Term& newest = result_.accepted.back().term;
-  if (newest.per_group || newest.effect->theory_only) return;
+bool Search::let_groups_differ(std::size_t t, bool before_others) {
+  if (!observations_.from_table || observations_.groups() < 2) return false;
+  const Term term = result_.accepted[t].term;
+  if (term.per_group || term.effect->theory_only) return false;
+  const auto place = static_cast<std::ptrdiff_t>(t);
   MeanModel others = fit_.model;
-  others.terms.pop_back();
-  InGroups own = fit_in_groups(newest, std::move(others));
-  if (p_of_groups(observations_, fit_, own.observations, own.fit) > settings_.alpha) return;
-  if (gain_of(own, before_others)) take(std::move(own));
+  others.terms.erase(others.terms.begin() + place);
+  InGroups own = fit_in_groups(term, std::move(others));
+  if (p_of_groups(observations_, fit_, own.observations, own.fit) > settings_.alpha ||
+      !gain_of(own, before_others))
+    return false;
+  const auto first = result_.accepted.begin() + place;
+  std::rotate(first, first + 1, result_.accepted.end());
+  take(std::move(own));
+  return true;
+}
+
+bool Search::let_any_differ() {
+  std::size_t t = result_.accepted.size();
+  while (t > 0 && !let_groups_differ(t - 1, false)) --t;
+  if (t == 0) return false;
+  // What was found later may have been what the groups differ by.
+  for (std::size_t k = result_.accepted.size(); k-- > t - 1;) {
+    const Term term = result_.accepted[k].term;
+    if (term.per_group || term.effect->theory_only) continue;
+    if (const JointFit without = fit_without(k); !is_still_found(term, without)) drop(k, without);
+  }
+  return true;
 }
 
 bool Search::accept_in_groups(const Term& way, double p) {
@@ -138,7 +151,10 @@ bool Search::another_does_as_well(const CrossValidation& own, const NullFit& var
     if (!fit.at_bound.empty()) continue;
     const CrossValidation with_both = cross_validate(observations_, difference(y_, fit.linear.offset),
                                                      fit.linear.columns, variances, rows_);
-    if (!compare(with_both, own).told_apart()) return true;
+    // A step chooses its place among all: it must do better.
+    const bool as_well = scan.ways[i].effect->has_change_point() ? compare(own, with_both).told_apart()
+                                                                 : !compare(with_both, own).told_apart();
+    if (as_well) return true;
   }
   return false;
 }

@@ -13,16 +13,6 @@ namespace tunnelrig {
 
 using Eigen::Index;
 
-namespace {
-
-Eigen::MatrixXd without_column(const Eigen::MatrixXd& columns, Index column) {
-  Eigen::MatrixXd result(columns.rows(), columns.cols() - 1);
-  result << columns.leftCols(column), columns.rightCols(columns.cols() - column - 1);
-  return result;
-}
-
-}  // namespace
-
 void Search::find_confounded() {
   for (std::size_t t = 0; t < result_.accepted.size(); ++t) {
     Accepted& accepted = result_.accepted[t];
@@ -95,15 +85,13 @@ std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
   while (!fit_.model.terms[t].same_way(accepted.term)) ++t;
   const Index own_place = place_among_own(fit_.model, t);
   const Index place = observations_.first_own_slope() + own_place;
-  Observations fewer = observations_;
-  fewer.slopes = without_column(observations_.slopes, place);
-  fewer.beyond = without_column(observations_.beyond, own_place);
+  const Observations fewer = without_own(observations_, fit_.model, t);
   const JointFit without = fit_without(t, fewer);
   const Eigen::MatrixXd predicted = predict_response(observations_, {}, rows_);
   const CrossValidation own = unseen(fit_, fit_.variances);
   for (const Term& way : ways_) {
     const std::string cause = way.effect->cause();
-    const bool taken = already_in(way, fit_.model) ||
+    const bool taken = already_in(way, fit_.model) || cause == accepted.term.effect->cause() ||
                        std::any_of(result.begin(), result.end(),
                                    [&](const Ranked& r) { return r.term.effect->cause() == cause; });
     if (taken) continue;

@@ -1,5 +1,7 @@
 #include "analysis/residual/search/step_profile.h"
 
+#include "analysis/residual/search/group_amplitudes.h"
+
 #include <algorithm>
 #include <iterator>
 #include <set>
@@ -44,14 +46,17 @@ int StepProfile::end_of_interval(bool highest) const {
   return result;
 }
 
-StepProfile step_profile(const Observations& observations, const MeanModel& model, std::size_t t,
+StepProfile step_profile(const Observations& given, const MeanModel& model, std::size_t t,
                          const std::vector<int>& rows) {
   constexpr std::ptrdiff_t kAtOnce = 32;
   constexpr double kClearlyNot = 3 * kStepInterval;  // beyond it a profile hardly comes back
-  const std::vector<int> possible = possible_rows(observations, rows);
+  const std::vector<int> possible = possible_rows(given, rows);
   StepProfile profile;
   if (possible.empty()) return profile;
   Term step = model.terms[t];
+  const Observations observations = step.per_group ? without_own(given, model, t) : given;
+  std::vector<int> groups;
+  for (const auto& [group, own] : rows_of_each(observations.group, rows)) groups.push_back(group);
   MeanModel rest = model;
   rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(t));
   const Forces forces = predict_forces(observations, rest, rows);
@@ -62,7 +67,11 @@ StepProfile step_profile(const Observations& observations, const MeanModel& mode
     std::vector<Candidate> candidates;
     for (auto row = first; row != last; ++row) {
       step.parameters[step.effect->change_point().value()] = *row;
-      candidates.push_back({.columns = {respond(step, observations, forces.predicted).derivative[0]}});
+      Components column = respond(step, observations, forces.predicted).derivative[0];
+      if (step.per_group)
+        candidates.push_back({.columns = columns_by_group(column, observations, groups, mixed)});
+      else
+        candidates.push_back({.columns = {std::move(column)}});
     }
     std::vector<double> result;
     for (const CandidateFit& fit : CandidateScan(mixed, linear.columns, candidates).fit(y))

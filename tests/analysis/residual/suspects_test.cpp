@@ -166,6 +166,26 @@ TEST_F(HeldOutRows, AreWrongWhereTheRestOfTheirBlockIsRight) {
   EXPECT_THAT(apart(), testing::IsEmpty()) << "nothing else is in its block";
 }
 
+/// A turbine's six runs at its lowest speed, where it gives nothing like the rest, and of others two.
+TEST(RepeatedRows, AreAConditionAndNoErrors) {
+  std::mt19937_64 random{test::seed()};
+  Observations table = test::simulate({.runs_of_block = std::vector<int>(12, 6)}, random);
+  table.from_table = true;
+  test::add_covariate(table, "tow_speed", 0.4, 1.2, random);
+  std::vector<SuspectRow> suspects;
+  for (const std::size_t row : {3U, 4U, 5U, 40U, 41U, 42U}) {
+    table.covariates.back().value(static_cast<Eigen::Index>(row), 0) = 0.2;
+    suspects.push_back({.row = table.name[row], .studentised = -80});
+  }
+  const SuspectRow alone{.row = table.name[20], .studentised = 30};
+  suspects.push_back(alone);
+  ASSERT_EQ(gross_rows(table, suspects).size(), 1u);
+  EXPECT_EQ(gross_rows(table, suspects)[0].row, alone.row);
+  suspects[0].studentised = suspects[1].studentised = 80;
+  suspects[2].studentised = suspects[3].studentised = 80;
+  EXPECT_EQ(gross_rows(table, suspects).size(), 3u) << "the two on the other side repeat nothing";
+}
+
 TEST_F(HeldOutRows, AreNotWrongWhereTheirBlockIsElsewhere) {
   for (int row = 16; row < 24; ++row) sealed.error(row, 0) = 0.9;
   EXPECT_THAT(apart(), testing::IsEmpty());

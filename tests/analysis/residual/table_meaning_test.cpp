@@ -36,6 +36,26 @@ TEST_F(TablesTest, FourSettingsAreFourBlocksHoweverManyBinsAreAskedFor) {
   EXPECT_EQ(e.verdict, "insufficient");
 }
 
+/// Of a coefficient under another name, and of a power, no theory says that they go with the square.
+TEST_F(TablesTest, OnlyForcesGoWithTheSquareOfTheSpeed) {
+  std::string csv = "n,V,y\n";
+  for (int r = 0; r < 60; ++r) csv += fmt::format("{},12,{}\n", 3000 + 50 * r, 1 + even(random));
+  const auto reason = [&](const char* unit, const char* effect) {
+    return testability(test::effect_named(effect),
+                       observed(csv, fmt::format("[response]\ncolumn = \"y\"\nunit = \"{}\"\n"
+                                                 "[speed]\ncolumn = \"n\"\nunit = \"rpm\"\n"
+                                                 "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\n"
+                                                 "meaning = \"supply_voltage_V\"\n",
+                                                 unit)))
+        .reason;
+  };
+  for (const char* unit : {"N", "N·m", "mV/V", "counts"}) EXPECT_EQ(reason(unit, "rotor_speed"), "") << unit;
+  for (const char* unit : {"1", "W", "m/s"})
+    EXPECT_THAT(reason(unit, "rotor_speed"), HasSubstr("go with the square")) << unit;
+  EXPECT_EQ(reason("N", "supply_voltage"), "supply_voltage_V is the same in every row")
+      << "nor when another effect has made the forces vary";
+}
+
 /// A power follows the air, a cell's counts its temperature; of a number without a unit neither is known.
 TEST_F(TablesTest, ANumberOfWhichNothingIsKnownFollowsNoAir) {
   std::string csv = "T,p,h,y\n";

@@ -161,7 +161,7 @@ TEST_F(TableSourceTest, ThrustsOfBothDirectionsAreOfASpeedWithTheirSign) {
   EXPECT_THAT(e.warnings, Not(Contains(HasSubstr("a tare that was not taken off"))));
   ASSERT_EQ(names(e), "bidirectional ") << explanation_text(e);
   EXPECT_NEAR(e.adopted[0].parameters[0].value, -0.25, 0.02);
-  EXPECT_LT(e.after.held_out_rmse, 0.05 * e.before.held_out_rmse);
+  EXPECT_LT(e.after.held_out_rmse, 2 * 0.02) << "about what the rows scatter by";
 }
 
 /// The density that C_T is made with has the pressure; it is not sought again.
@@ -334,7 +334,7 @@ TEST_F(TableSourceTest, EveryRowHasTheTipOfItsOwnPropeller) {
 TEST_F(TableSourceTest, TheSeparatingRunIsThatOfTheMagnitudes) {
   std::string up = "b,g,N,T,y\n", down = up;
   for (int r = 0; r < 96; ++r) {
-    const double rpm = 4800 + 400 * even(random), celsius = 20 + 0.2 * scatter(random);
+    const double rpm = 4800 + 400 * even(random), celsius = 20 + 0.02 * scatter(random);
     const double c_t = 0.1 * std::pow(rpm / 5000, 0.4) * (1 + 0.002 * scatter(random));
     const std::string row = fmt::format("{},{},{},{},", r / 8, r % 2 == 0 ? "p" : "q", rpm, celsius);
     up += row + fmt::format("{}\n", c_t);
