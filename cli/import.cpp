@@ -1,3 +1,4 @@
+#include "analysis/model/model_store.h"
 #include "analysis/residual/observations/observations.h"
 #include "analysis/run_summary.h"
 #include "cli/console.h"
@@ -9,6 +10,8 @@
 #include "datasets/unit_doubts.h"
 
 #include <chrono>
+#include <exception>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -112,13 +115,33 @@ int import_rows(const ImportVerbOptions& options) {
     doubts.push_back(
         "no column Motor Optical Speed or Motor Electrical Speed has a value: thrust without speed gives no "
         "C_T");
+  for (const TableColumn& column : table.schema.covariates)
+    if (column.column == table.schema.response.column)
+      doubts.push_back(fmt::format("{} is the response: it is no covariate of itself", column.column));
   for (const std::string& doubt : doubts) warn(doubt);
   print_rows(options, table, parts, doubts);
   return kWell;
 }
 
+/// Of the model, in the campaign that is replaced; 0 where it cannot be read.
+std::size_t versions_in(const std::string& db) {
+  try {
+    return std::filesystem::exists(db) ? stored_models(CampaignFile(db, CampaignFile::Access::kRead)).size()
+                                       : 0;
+  } catch (const std::exception&) {
+    return 0;
+  }
+}
+
 int run_import(const ImportVerbOptions& options) {
-  return options.format == "folder" ? import_folder(options) : import_rows(options);
+  const std::size_t lost = options.replace ? versions_in(options.db) : 0;
+  const int code = options.format == "folder" ? import_folder(options) : import_rows(options);
+  if (lost > 0)
+    warn(
+        fmt::format("{} {} of the model that explain --adopt had stored in {} went with the campaign that "
+                    "was replaced",
+                    lost, lost == 1 ? "version" : "versions", options.db));
+  return code;
 }
 
 }  // namespace

@@ -113,6 +113,8 @@ TEST_F(Adopted, RunsScatterLessAndAgreeWithTheTruthAndThesisComesBack) {
   EXPECT_EQ(read_text(folder / "out/campaign.toml"), read_text(folder / "source/campaign.toml"));
   expect(0, "import out --db again.db");
   EXPECT_EQ(output("models --db again.db --json")["versions"].size(), 1u);
+  EXPECT_EQ(run("import out --db again.db --replace").error, "");
+  EXPECT_THAT(run("import out --db c.db --replace").error, HasSubstr("1 version of the model"));
 }
 
 TEST_F(Adopted, BadInputIsNamed) {
