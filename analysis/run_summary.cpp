@@ -227,7 +227,9 @@ class Summarizer : public RunSummarizer {
                              .lines = {}};
     if (with_spectrum_) {
       LineList found = find_lines(spectrum_, c, campaign_.daq.sample_rate_hz,
-                                  campaign_.rig.nominal_speed_rpm / 60, campaign_.rig.blades);
+                                  {.shaft_hz = campaign_.rig.nominal_speed_rpm / 60,
+                                   .blades = campaign_.rig.blades,
+                                   .mains_hz = campaign_.daq.mains_hz});
       result.lines = std::move(found.lines);
       if (found.shaft_hz > 0) result.shaft_hz = found.shaft_hz;
     }

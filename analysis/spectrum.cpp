@@ -197,37 +197,49 @@ double folded(double frequency_hz, double rate_hz) {
 struct Origin {
   std::string name;
   double hz, sigma_hz;
-  double rarity;  // −ln of how common it is beside the others
+  double rarity;         // −ln of how common it is beside the others
+  bool of_shaft = true;  // a low multiple, which vibration is sure to have
 };
 
-std::vector<Origin> origins(double shaft_hz, double rate_hz, double bin_hz, int blades) {
+std::vector<Origin> origins(double shaft_hz, double rate_hz, double bin_hz, const LineSources& sources) {
+  constexpr int kLow = 8;
   constexpr double kError_bins = 0.3, kGrid_Hz = 0.05;
   constexpr double kOvertone = 1, kAlias = 3, kHarmonic = 0.5;
   const double error_hz = kError_bins * bin_hz;
   std::vector<Origin> result;
   for (int k = 1; shaft_hz > 0 && k <= 16; ++k) {
     const bool alias = k * shaft_hz > rate_hz / 2;
-    const std::string base = k == 1 ? "shaft" : k == blades ? "blade_pass" : fmt::format("shaft_x{}", k);
+    const std::string base = k == 1                ? "shaft"
+                             : k == sources.blades ? "blade_pass"
+                                                   : fmt::format("shaft_x{}", k);
     result.push_back({alias ? base + "_alias" : base, folded(k * shaft_hz, rate_hz),
                       std::hypot(1, k) * error_hz,
-                      alias                   ? kAlias
-                      : k == 1 || k == blades ? 0
-                                              : kOvertone});
+                      alias                           ? kAlias
+                      : k == 1 || k == sources.blades ? 0
+                                                      : kOvertone,
+                      !alias && k <= kLow});
   }
-  for (const int mains : {50, 60})
+  const std::vector<double> grids =
+      sources.mains_hz ? std::vector{*sources.mains_hz} : std::vector<double>{50, 60};
+  for (const double mains_hz : grids)
     for (int k = 1; k <= 5; ++k)
-      result.push_back({fmt::format("mains_{}", k * mains), folded(k * mains, rate_hz),
-                        std::hypot(error_hz, k * kGrid_Hz), k > 1 ? kHarmonic : 0});
+      result.push_back({fmt::format("mains_{:g}", k * mains_hz), folded(k * mains_hz, rate_hz),
+                        std::hypot(error_hz, k * kGrid_Hz), k > 1 ? kHarmonic : 0, false});
   return result;
 }
 
-/// The likeliest origin within a bin and a half; empty: none is as near.
+/// The likeliest origin within a bin and a half; empty: none is as near. Vibration has low multiples of the
+/// shaft wherever it turns, so what one of them may be is no hum.
 std::string name_of_line(double frequency_hz, const std::vector<Origin>& known, double tolerance_hz) {
+  constexpr double kMayBe = 2;  // σ
   std::string name;
   double best = -std::numeric_limits<double>::infinity();
+  bool may_be_shaft = false;
   for (const Origin& origin : known) {
     const double off_hz = frequency_hz - origin.hz;
     if (std::abs(off_hz) > tolerance_hz) continue;
+    may_be_shaft |= origin.of_shaft && std::abs(off_hz) <= kMayBe * origin.sigma_hz;
+    if (may_be_shaft && origin.name.starts_with("mains")) break;  // they come last
     const double likely =
         -0.5 * std::pow(off_hz / origin.sigma_hz, 2) - std::log(origin.sigma_hz) - origin.rarity;
     if (likely <= best) continue;
@@ -240,18 +252,23 @@ std::string name_of_line(double frequency_hz, const std::vector<Origin>& known, 
 }  // namespace
 
 LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double rate_hz,
-                    double expected_shaft_hz, int blades) {
+                    const LineSources& sources) {
   LineList list;
   if (spectrum.segments() == 0) return list;
   const double bin_hz = rate_hz / static_cast<double>(spectrum.window());
   list.lines = peaks(spectrum, channel, bin_hz);
-  for (const SpectralLine& line : list.lines) {  // strongest first
-    if (std::abs(line.frequency_hz / expected_shaft_hz - 1) > kShaftBand) continue;
-    list.shaft_hz = line.frequency_hz;
-    break;
-  }
+  const auto strongest_about = [&](double hz) {  // 0: none
+    const auto found = std::ranges::find_if(list.lines, [&](const SpectralLine& line) {
+      return std::abs(line.frequency_hz / hz - 1) <= kShaftBand;
+    });
+    return found == list.lines.end() ? 0 : found->frequency_hz;
+  };
+  list.shaft_hz = strongest_about(sources.shaft_hz);
+  // A propeller that is balanced well has the line of its blades alone.
+  const double shaft_hz =
+      list.shaft_hz > 0 ? list.shaft_hz : strongest_about(sources.blades * sources.shaft_hz) / sources.blades;
   if (list.lines.size() > kMostLines) list.lines.resize(kMostLines);
-  const std::vector<Origin> known = origins(list.shaft_hz, rate_hz, bin_hz, blades);
+  const std::vector<Origin> known = origins(shaft_hz, rate_hz, bin_hz, sources);
   for (SpectralLine& line : list.lines)
     line.name =
         line.frequency_hz == list.shaft_hz ? "shaft" : name_of_line(line.frequency_hz, known, 1.5 * bin_hz);

@@ -4,6 +4,7 @@
 #include "datasets/run_statistics.h"
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -44,15 +45,22 @@ class WelchSpectrum {
   std::vector<double> power_;
 };
 
-/// The shaft's line: the strongest within 4 % of where it is expected, if it stands out.
+/// What the lines of a run may be of.
+struct LineSources {
+  double shaft_hz = 0;  // about where its line is expected
+  int blades = 2;
+  std::optional<double> mains_hz = {};  // of the grid; not known: 50 or 60 Hz
+};
+
 /// The lines of a spectrum, strongest first, at most twelve; named after the shaft (shaft, blade_pass =
 /// as many times the shaft as a propeller has blades, shaft_x3 …, with _alias beyond the Nyquist frequency)
-/// or the mains (mains_50 …).
+/// or the mains (mains_50 …). The shaft's is the strongest within 4 % of where it is expected, if it stands
+/// out. A line of the mains is none that a multiple of the shaft may be.
 struct LineList {
   std::vector<SpectralLine> lines;
   double shaft_hz = 0;  // 0: none found
 };
 LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double rate_hz,
-                    double expected_shaft_hz, int blades);
+                    const LineSources& sources);
 
 }  // namespace tunnelrig

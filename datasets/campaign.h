@@ -37,11 +37,13 @@ struct Tunnel {
   double height_m = 1.5;  // h_t
 };
 
+inline constexpr double kUsualMains_hz = 50;  // of most grids
+
 struct Daq {
   double sample_rate_hz = 4000.0 / 3.0;
   int adc_bits = 12;
   double adc_reference_V = 3.3;
-  double mains_hz = 50;
+  std::optional<double> mains_hz;  // of the grid, where it was said
 
   /// volts = counts · adc_reference_V / 2^adc_bits
   double volts_per_count() const;

@@ -118,7 +118,7 @@ Daq parse_daq(Section& section) {
   daq.sample_rate_hz = section.number("sample_rate_hz", 1, 1e6, "Hz").value_or(daq.sample_rate_hz);
   daq.adc_bits = section.whole("adc_bits", 1, 16, "bits").value_or(daq.adc_bits);
   daq.adc_reference_V = section.number("adc_reference_V", 0.01, 100, "V").value_or(daq.adc_reference_V);
-  daq.mains_hz = section.number("mains_hz", 1, 1000, "Hz").value_or(daq.mains_hz);
+  daq.mains_hz = section.number("mains_hz", 1, 1000, "Hz");
   return daq;
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace tunnelrig {
 namespace {
@@ -68,26 +69,34 @@ AmplitudeFit joint_fit_of(const Observations& observations, const Explanation& e
   return fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);
 }
 
-/// Where the model's parameters stand among the joint fit's columns (−1: nowhere), and their standard
-/// uncertainty.
+/// Where a parameter of the model stands among the joint fit's columns (−1: nowhere), and how far it is
+/// known.
 struct Placed {
-  std::vector<Index> column;
-  std::vector<double> uncertainty;
+  Index column;
+  double uncertainty;
+  std::size_t term;                // of curves: none of the effects
+  std::vector<double> deviations;  // of the jackknife; empty for curves
 };
 
-MatrixXd covariance_of(const Placed& placed, const MatrixXd& columns) {
-  const auto size = static_cast<Index>(placed.column.size());
+/// How two go together: those of one effect (an amplitude and its time constant lie on a ridge that is no
+/// ellipse) as the jackknife's folds do, others as their columns do.
+double covariance_of_two(const Placed& one, const Placed& two, const MatrixXd& columns) {
+  if (one.column < 0 || two.column < 0) return 0;
+  if (one.term == two.term && !one.deviations.empty() && one.deviations.size() == two.deviations.size())
+    return std::inner_product(one.deviations.begin(), one.deviations.end(), two.deviations.begin(), 0.0);
+  const double correlation = columns(one.column, two.column) /
+                             std::sqrt(columns(one.column, one.column) * columns(two.column, two.column));
+  if (!std::isfinite(correlation)) return 0;
+  return one.uncertainty * two.uncertainty * std::clamp(correlation, -1.0, 1.0);
+}
+
+MatrixXd covariance_of(const std::vector<Placed>& placed, const MatrixXd& columns) {
+  const auto size = static_cast<Index>(placed.size());
   MatrixXd covariance = MatrixXd::Zero(size, size);
   for (Index i = 0; i < size; ++i)
     for (Index j = 0; j < size; ++j) {
-      const Index a = placed.column[static_cast<std::size_t>(i)],
-                  b = placed.column[static_cast<std::size_t>(j)];
-      const double both =
-          placed.uncertainty[static_cast<std::size_t>(i)] * placed.uncertainty[static_cast<std::size_t>(j)];
-      if (i == j) covariance(i, j) = both;
-      if (i == j || a < 0 || b < 0) continue;
-      const double correlation = columns(a, b) / std::sqrt(columns(a, a) * columns(b, b));
-      if (std::isfinite(correlation)) covariance(i, j) = both * std::clamp(correlation, -1.0, 1.0);
+      const Placed &one = placed[static_cast<std::size_t>(i)], &two = placed[static_cast<std::size_t>(j)];
+      covariance(i, j) = i == j ? one.uncertainty * one.uncertainty : covariance_of_two(one, two, columns);
     }
   return covariance;
 }
@@ -129,14 +138,14 @@ Adoption adopt(const Observations& observations, const Explanation& explanation,
     return result;
   }
   const AmplitudeFit fit = joint_fit_of(observations, explanation);
-  Placed placed;
+  std::vector<Placed> placed;
   Index column = 0;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     model.terms.push_back(model_term(adopted, observations));
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k) {
       const bool has = has_column(model.terms.back(), k);
-      placed.column.push_back(has ? column++ : -1);
-      placed.uncertainty.push_back(has ? adopted.parameters[k].standard_error : 0);
+      placed.push_back({has ? column++ : -1, has ? adopted.parameters[k].standard_error : 0,
+                        model.terms.size(), adopted.parameters[k].deviations});
     }
     if (!adopted.confounded_with.empty())
       result.notes.push_back(fmt::format("{} is adopted, and these data cannot tell it from {}",
@@ -147,8 +156,7 @@ Adoption adopt(const Observations& observations, const Explanation& explanation,
     if (curves_wanted && acts_on_means(curve)) {
       model.curves.push_back(model_curve(curve, fit.amplitude.segment(column, bends), observations));
       for (Index k = column; k < column + bends; ++k) {
-        placed.column.push_back(k);
-        placed.uncertainty.push_back(std::sqrt(std::max(0.0, fit.covariance(k, k))));
+        placed.push_back({k, std::sqrt(std::max(0.0, fit.covariance(k, k))), 0, {}});
       }
     } else {
       result.notes.push_back(fmt::format("the curve over {} is not adopted{}", curve.label(),

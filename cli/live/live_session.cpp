@@ -64,7 +64,7 @@ void LiveSession::say_hello() {
             {"sample_rate_hz", info.daq.sample_rate_hz},
             {"nominal_speed_rpm", info.rig.nominal_speed_rpm},
             {"blades", info.rig.blades},
-            {"mains_hz", info.daq.mains_hz},
+            {"mains_hz", info.daq.mains_hz.value_or(kUsualMains_hz)},
             {"cell_limit_N", info.rig.cell_limit_N},
             {"source", settings_.source},
             {"simulated", settings_.source.starts_with("virtual")},

@@ -47,7 +47,9 @@ LiveSpectrum live_spectrum(const FrameWindow& frames, const Scale& scale, const 
                    [](double value) { return std::sqrt(value); });
     spectrum.amplitude.push_back(std::move(amplitude));
     const double seen_hz =
-        find_lines(welch, c, rate_hz, info.rig.nominal_speed_rpm / 60, info.rig.blades).shaft_hz;
+        find_lines(welch, c, rate_hz,
+                   {.shaft_hz = info.rig.nominal_speed_rpm / 60, .blades = info.rig.blades})
+            .shaft_hz;
     if (seen_hz > 0) shafts.push_back(seen_hz);
   }
   if (!shafts.empty()) {
@@ -59,7 +61,8 @@ LiveSpectrum live_spectrum(const FrameWindow& frames, const Scale& scale, const 
   for (int k = 1; k <= kBladeHarmonics; ++k)
     spectrum.lines.push_back(marked(harmonic("blade pass", k), k * info.rig.blades * shaft_hz, rate_hz));
   for (int k = 1; k <= kMainsHarmonics; ++k)
-    spectrum.lines.push_back(marked(harmonic("mains", k), k * info.daq.mains_hz, rate_hz));
+    spectrum.lines.push_back(
+        marked(harmonic("mains", k), k * info.daq.mains_hz.value_or(kUsualMains_hz), rate_hz));
   return spectrum;
 }
 

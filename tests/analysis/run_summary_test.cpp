@@ -245,6 +245,36 @@ TEST(RunSummary, AHumIsNoAliasOfAFastShaft) {
   EXPECT_EQ(channel.lines[1].name, "mains_50");
 }
 
+/// At 3000 and 5000 rev/min multiples of the shaft lie on those of the grid; at 5230 they do not.
+TEST(RunSummary, WhatAMultipleOfTheShaftMayBeIsNoHum) {
+  std::mt19937_64 engine(13);
+  std::normal_distribution<double> unit;
+  const auto names = [&](double speed_rpm, const std::vector<double>& lines_hz,
+                         std::optional<double> mains_hz, double shaft_V = 0.1) {
+    CampaignInfo campaign = kCampaign;
+    campaign.rig.nominal_speed_rpm = speed_rpm;
+    campaign.daq.mains_hz = mains_hz;
+    const auto summarizer = make_run_summarizer(campaign, {SampleType::kFloat64, 4});
+    summarizer->frames(volts(8000, [&](std::size_t i, std::size_t) {
+      double sum = 2 + 0.02 * unit(engine) + shaft_V * wave(speed_rpm / 60, i);
+      for (const double hz : lines_hz) sum += 0.04 * wave(hz, i);
+      return sum;
+    }));
+    std::map<double, std::string> found;
+    const RunStatistics statistics = summarizer->finish("hash");  // the loop refers to it
+    for (const SpectralLine& line : statistics.channels[0].lines)
+      found[std::round(line.frequency_hz)] = line.name;
+    return found;
+  };
+  EXPECT_EQ(names(3000.5, {100, 150}, {})[100], "blade_pass");
+  EXPECT_EQ(names(3000.5, {100, 150}, {})[150], "shaft_x3");
+  EXPECT_EQ(names(5002, {250.05}, {})[250], "shaft_x3");
+  EXPECT_EQ(names(5230, {100, 250}, {})[250], "mains_250");
+  EXPECT_EQ(names(5230, {60}, {})[60], "mains_60");
+  EXPECT_EQ(names(5230, {60}, 50)[60], "") << "of another grid than the campaign's";
+  EXPECT_EQ(names(5230, {2 * 5230.0 / 60}, {}, 0)[174], "blade_pass") << "of a propeller without imbalance";
+}
+
 TEST(RunSummary, NoiseHasNoLines) {
   std::mt19937_64 engine(11);
   std::normal_distribution<double> unit;

@@ -103,7 +103,7 @@ TEST(CampaignToml, SaysWhatTheLivePageExpects) {
   const CampaignInfo plain = parse_campaign_toml(text, "c.toml");
   EXPECT_EQ(plain.rig.blades, 2);
   EXPECT_EQ(plain.rig.cell_limit_N, 9.81);
-  EXPECT_EQ(plain.daq.mains_hz, 50);
+  EXPECT_EQ(plain.daq.mains_hz, std::nullopt);
   const CampaignInfo given =
       parse_campaign_toml(text + "blades = 3\ncell_limit_N = 49\n[daq]\nmains_hz = 60\n", "c.toml");
   EXPECT_EQ(given.rig.blades, 3);

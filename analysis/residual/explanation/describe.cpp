@@ -26,15 +26,22 @@ struct Stretch {
   double low, high;
 };
 
+/// What a curve is over in these rows: of one rotor's the rotor's own, since another may have gone further.
+MatrixXd own_x(const Curve& curve, const std::vector<int>& rows) {
+  const bool of_rotor = curve.rotor >= 0 && curve.x.cols() > 1;
+  return of_rotor ? MatrixXd(curve.x(rows, curve.rotor)) : MatrixXd(curve.x(rows, Eigen::all));
+}
+
 /// Where the groups' ranges overlap. From one stretch to the next the groups' constants may have any
 /// difference: the curve is not known there.
 std::vector<Stretch> stretches_of(const Observations& observations, const std::vector<int>& rows,
                                   const Curve& curve) {
-  const Stretch all{curve.x.minCoeff(), curve.x.maxCoeff()};
+  const MatrixXd of_all = own_x(curve, rows);
+  const Stretch all{of_all.minCoeff(), of_all.maxCoeff()};
   if (curve.strength || !curve.everywhere()) return {all};
   std::vector<Stretch> of_groups;
   for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
-    const MatrixXd x = curve.x(own, Eigen::all);
+    const MatrixXd x = own_x(curve, own);
     of_groups.push_back({x.minCoeff(), x.maxCoeff()});
   }
   std::sort(of_groups.begin(), of_groups.end(),
@@ -157,7 +164,7 @@ void keep_to_its_own_size(const Observations& observations, const std::vector<in
 }
 
 std::vector<double> values_seen(const Curve& curve, const std::vector<int>& rows) {
-  const MatrixXd x = curve.x(rows, Eigen::all);
+  const MatrixXd x = own_x(curve, rows);
   std::vector<double> seen(x.data(), x.data() + x.size());
   std::ranges::sort(seen);
   seen.erase(std::unique(seen.begin(), seen.end()), seen.end());

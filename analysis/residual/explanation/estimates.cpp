@@ -99,13 +99,13 @@ struct Jackknife {
   MeanModel centre;
   std::vector<std::vector<std::vector<double>>> values;  // by fold, last
 
-  double standard_error(std::size_t term, std::size_t parameter) const {
-    const std::vector<double>& of = values[term][parameter];
+  /// Their sum of squares is the parameter's variance.
+  std::vector<double> deviations(std::size_t term, std::size_t parameter) const {
+    std::vector<double> of = values[term][parameter];
     const double n = static_cast<double>(of.size());
     const double mean = std::accumulate(of.begin(), of.end(), 0.0) / n;
-    double squares = 0;
-    for (const double value : of) squares += (value - mean) * (value - mean);
-    return std::sqrt((n - 1) / n * squares);
+    for (double& value : of) value = (value - mean) * std::sqrt((n - 1) / n);
+    return of;
   }
 };
 
@@ -144,7 +144,10 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
       const EffectParameter& parameter = term.effect->parameters[k];
       const bool theory = k == 0 && term.at_theory;
       const Jackknife& says = theory && freed ? *freed : found;
-      const double error = says.standard_error(t, k), half = half_width_95(error, dof);
+      std::vector<double> deviations = says.deviations(t, k);
+      const double error =
+          std::sqrt(std::inner_product(deviations.begin(), deviations.end(), deviations.begin(), 0.0));
+      const double half = half_width_95(error, dof);
       const double middle = says.centre.terms[t].parameters[k];
       // No time is below zero. What an amplitude's interval says of its sign stays said.
       const bool bounded = parameter.role == ParameterRole::kShape;
@@ -154,6 +157,7 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
                            .low = bounded ? std::max(middle - half, parameter.lower) : middle - half,
                            .high = bounded ? std::min(middle + half, parameter.upper) : middle + half,
                            .standard_error = error,
+                           .deviations = std::move(deviations),
                            .theory = theory});
     }
   }

@@ -161,12 +161,32 @@ std::string taken_back_all(const Explanation& explanation) {
       curves_do_better(explanation) ? explanation.sealed.curves : explanation.before.held_out_rmse);
 }
 
+/// What was found, and what of it all runs refute.
+struct Found {
+  Explanation explanation;
+  Refuted refuted;
+  std::vector<const Effect*> effects;
+  SearchSettings settings;
+  std::size_t said;  // sentences before it
+};
+
+void say(const Refuted& refuted, bool stay, std::vector<std::string>& said) {
+  for (std::size_t k = 0; k < refuted.terms.size(); ++k)
+    said.push_back(
+        refuted.terms[k].label() +
+        (stay ? " stays, since the sealed blocks are predicted worse without it, though with them in, "
+              : " was found and is taken back: with the sealed blocks in, ") +
+        refuted.why[k]);
+}
+
 /// Once more without the names that are refuted: what they did may be structure whose cause is not known.
-/// Where the names predict the sealed blocks, and what is found without them does not, they stay. What may
-/// not be found any more is out of `effects` and `settings` then.
+/// Where the names predict the sealed blocks, and what is found without them does not, they stay; so does the
+/// first of names that took each other's place and are all refuted like that. What may not be found any more
+/// is out of `effects` and `settings` then.
 Explanation without_refuted(Explanation explanation, const Observations& observations,
                             std::vector<const Effect*>& effects, SearchSettings& settings,
                             std::vector<std::string>& said) {
+  std::vector<Found> before;
   for (Refuted found = refuted(explanation, observations); found.any();
        found = refuted(explanation, observations)) {
     std::vector<const Effect*> fewer = effects;
@@ -179,14 +199,24 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
     const double without_them = found.structure ? without.sealed.all : without.sealed.names;
     const bool stay = !found.at_bound && worse(explanation.sealed.curves, explanation.sealed.all) &&
                       worse(without_them, explanation.sealed.all);
-    if (found.all) said.push_back(taken_back_all(explanation));
-    for (std::size_t k = 0; k < found.terms.size(); ++k)
-      said.push_back(
-          found.terms[k].label() +
-          (stay ? " stays, since the sealed blocks are predicted worse without it, though with them in, "
-                : " was found and is taken back: with the sealed blocks in, ") +
-          found.why[k]);
-    if (stay) break;
+    if (stay) {
+      const auto as_well = std::ranges::find_if(before, [&](const Found& earlier) {
+        return !earlier.refuted.all && !earlier.refuted.at_bound &&
+               !worse(earlier.explanation.sealed.all, explanation.sealed.all);
+      });
+      if (as_well == before.end()) {
+        say(found, true, said);
+        break;
+      }
+      said.resize(as_well->said);
+      say(as_well->refuted, true, said);
+      effects = std::move(as_well->effects);
+      settings = std::move(as_well->settings);
+      return std::move(as_well->explanation);
+    }
+    before.push_back({std::move(explanation), found, effects, settings, said.size()});
+    if (found.all) said.push_back(taken_back_all(before.back().explanation));
+    say(found, false, said);
     explanation = std::move(without);
     effects = std::move(fewer);
     settings = std::move(stricter);

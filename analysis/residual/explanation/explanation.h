@@ -31,9 +31,10 @@ struct ParameterEstimate {
   std::string name, unit;
   double value = 0, low = 0, high = 0;  // 95 %; of a time constant or length within its physical bounds
   double standard_error = 0;            // where blocks give one
-  bool theory = false;                  // the value is known physics; the interval is what the data say
-  std::vector<GroupEstimate> groups;    // where each group has its own; value is their median then
-  std::string run;                      // of a change-point: the first run (row) behind it
+  std::vector<double> deviations;  // of the jackknife's folds: the covariance of two is their product's sum
+  bool theory = false;             // the value is known physics; the interval is what the data say
+  std::vector<GroupEstimate> groups;  // where each group has its own; value is their median then
+  std::string run;                    // of a change-point: the first run (row) behind it
 };
 
 /// The run that would tell confounded effects apart.

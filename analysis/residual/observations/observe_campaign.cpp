@@ -339,6 +339,11 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
   add_texts(source, result);
   add_derived_covariates(source, result);
   add_raw_covariates(source, result);
+  // A column explains itself, and what is made of it.
+  std::erase_if(result.covariates, [&](const Covariate& covariate) {
+    return covariate.name == result.response ||
+           (covariate.name == "air_temperature_rate_K_s" && result.response == "air_temperature_C");
+  });
   set_conditions_at_zero(data, reduction, source.order, result);
   if (result.response == "thrust" || result.response == "cell") add_courses(source, result);
   return result;

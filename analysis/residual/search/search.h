@@ -125,15 +125,15 @@ class Search {
   /// p of a likelihood ratio of one parameter of a fitted model: few rows are no large sample.
   double ratio_p(double ratio, const JointFit& fit) const;
   void read_back_terms();
-  /// With a new effect in, an older one may be explained better by another: it gives way.
+  /// With a new effect in, an older one may be explained better by another: it gives way; to nothing, where
+  /// neither is beyond chance any more.
   void swap_weaker();
   /// Or by another form of itself, which was chosen while the newer was not known: the likelier, where each
   /// parameter that a form has more must be worth a ratio test.
   bool change_a_form();
   /// What swaps try, beside the model without the term, and what they do then.
   JointFit fit_beside(const JointFit& without, const Scan& scan, std::size_t way);
-  void put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, const Scan& scan,
-                    std::size_t way);
+  void put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, double p);
   double evidence_of(const Scan& scan, const Term& term) const;
   JointFit fit_without(std::size_t t) const { return fit_without(t, observations_); }
   JointFit fit_without(std::size_t t, const Observations& observations) const;

@@ -40,8 +40,13 @@ void Search::swap_weaker() {
     if (scan.ways[best].same_way(old) || !(scan.fits[best].evidence > evidence_of(scan, old) + kSwapDecades))
       continue;
     const JointFit tried = fit_beside(without, scan, best);
-    if (tried.variances.log_likelihood > fit_.variances.log_likelihood && tried.at_bound.empty())
-      put_in_place(t, without, tried, scan, best);
+    if (!(tried.variances.log_likelihood > fit_.variances.log_likelihood) || !tried.at_bound.empty())
+      continue;
+    NullMaxima maxima = maxima_of(without, scan, ++salt_);
+    if (const double p = maxima.p(scan.fits[best].evidence); p <= settings_.alpha)
+      put_in_place(t, without, tried, p);
+    else
+      drop(t--, without);  // with the newest in, neither is beyond chance
   }
 }
 
@@ -58,7 +63,7 @@ bool Search::change_a_form() {
     for (const auto& [effect, i] : best) {
       const JointFit tried = fit_beside(without, scan, i);
       if (!(worth(tried) > worth(fit_)) || !tried.at_bound.empty()) continue;
-      put_in_place(t, without, tried, scan, i);
+      put_in_place(t, without, tried, maxima_of(without, scan, ++salt_).p(scan.fits[i].evidence));
       return true;
     }
   }
@@ -72,14 +77,12 @@ JointFit Search::fit_beside(const JointFit& without, const Scan& scan, std::size
   return tried;
 }
 
-void Search::put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, const Scan& scan,
-                          std::size_t way) {
-  NullMaxima maxima = maxima_of(without, scan, ++salt_);
+void Search::put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, double p) {
   const auto rmse_of = [this](const JointFit& fit) { return unseen(fit, fit.variances).rmse(); };
   fit_ = tried;
   const auto place = result_.accepted.begin() + static_cast<std::ptrdiff_t>(t);
   std::rotate(place, place + 1, result_.accepted.end());  // the new term is the model's last
-  result_.accepted.back().p = maxima.p(scan.fits[way].evidence);
+  result_.accepted.back().p = p;
   result_.accepted.back().gain = rmse_of(without) - rmse_of(fit_);
   read_back_terms();
 }
