@@ -109,6 +109,14 @@ TEST_F(ExplainProgram, ARunWithARotorThatPushesIsLeftOutAndSaid) {
   EXPECT_EQ(e["verdict"], "explained");
 }
 
+/// The supply and the thrust go together, but nothing goes with the supply but itself.
+TEST_F(ExplainProgram, AColumnIsNotExplainedByItself) {
+  write_campaign(10, "", sag);
+  import_campaign();
+  const json e = explained("--response supply_voltage_V");
+  EXPECT_EQ(e["verdict"], "no_structure") << text;
+}
+
 TEST_F(ExplainProgram, AFewSessionsAreInsufficient) {
   for (const int sessions : {1, 5}) {
     write_campaign(sessions, "", sag);

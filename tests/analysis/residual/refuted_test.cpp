@@ -174,5 +174,30 @@ TEST_F(Refuted, AColumnThatTheBaselineHasChangesNoVariance) {
   EXPECT_DOUBLE_EQ(with.log_likelihood, without.log_likelihood);
 }
 
+/// Creep and a wake that builds up are nearly the same, and of eight short sessions the time constant is
+/// hardly known: the interval of either amplitude may hold 0. Whichever stays, the other is in its set.
+TEST(Twins, WhichTakeEachOthersPlaceAreBothSaid) {
+  std::mt19937_64 random{test::seed()};
+  int named = 0;
+  for (int campaign = 0; campaign < 24; ++campaign) {
+    Observations o = test::simulate(
+        {.runs_of_block = std::vector<int>(8, 8), .channels = 4, .sigma = 0.004, .session_ratio = 0.3},
+        random);
+    test::add_covariate(o, "time_since_motor_start_s", 5, 400, random);
+    const std::string truth = campaign % 2 == 0 ? "creep" : "wake_recirculation";
+    test::add_effect(o, truth, {0.02, 300});
+    const Explanation e = explained(o);
+    for (const AdoptedEffect& adopted : e.adopted) {
+      const std::string& name = adopted.term.effect->name;
+      if (adopted.term.rotor >= 0 || (name != "creep" && name != "wake_recirculation")) continue;
+      ++named;
+      EXPECT_TRUE(name == truth || std::ranges::count(adopted.confounded_with, truth) == 1)
+          << "campaign " << campaign << " of " << truth << "\n"
+          << explanation_text(e);
+    }
+  }
+  EXPECT_GE(named, 12);
+}
+
 }  // namespace
 }  // namespace tunnelrig

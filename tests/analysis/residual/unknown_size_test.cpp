@@ -54,5 +54,24 @@ TEST_F(UnknownSizeTest, ACurveIsDrawnWhereThereAreRows) {
     EXPECT_TRUE(point.x == 21 || point.x == 22 || point.x == 64) << point.x;
 }
 
+/// What one rotor clips, where others clip far more.
+TEST_F(UnknownSizeTest, ACurveOfOneRotorIsDrawnOverItsOwnRange) {
+  Observations o = test::simulate(
+      {.runs_of_block = std::vector<int>(16, 8), .channels = 4, .sigma = 0.002, .session_ratio = 0.3},
+      random);
+  Eigen::MatrixXd share(o.rows(), 4);
+  for (double& of : share.reshaped()) of = even(random);
+  share.col(0) *= 0.3;
+  o.covariates.push_back({"share_of_something", share});
+  Eigen::MatrixXd y = o.y;
+  y.col(0) += 0.02 * (share.col(0).array() * (2 * 3.14159 / 0.3)).sin().matrix();
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  ASSERT_FALSE(e.unknown.empty()) << explanation_text(e);
+  EXPECT_EQ(e.unknown[0].rotor, 0);
+  EXPECT_LE(e.unknown[0].shape.back().x, 0.3);
+  EXPECT_NEAR(e.unknown[0].amplitude, 0.02 * 7, 0.4 * 0.02 * 7);
+}
+
 }  // namespace
 }  // namespace tunnelrig
