@@ -1,6 +1,7 @@
 // The doctor's second half: whether a campaign is fit to be reduced and mapped.
 #include "analysis/findings.h"
 #include "analysis/implausible_thrust.h"
+#include "analysis/misread_runs.h"
 #include "analysis/reduction.h"
 #include "datasets/error.h"
 
@@ -218,6 +219,19 @@ class Fitness : public Findings {
       note("thrusts", doubt->found, doubt->advice);
   }
 
+  void misread() {
+    const MisreadRuns runs = misread_runs(data_);
+    Names tares, broken;
+    for (const std::string& run : runs.loaded_tares) tares.add(run);
+    for (const std::string& run : runs.broken_off) broken.add(run);
+    if (!tares.empty())
+      problem("tares", "loaded like thrust runs: " + tares.text(),
+              "correct their kind in runs.csv, or exclude them: they shift the zero of their session");
+    if (!broken.empty())
+      problem("thrusts", "not one state, their means are known to no better than 5 %: " + broken.text(),
+              "did a motor stop within the run? Exclude these runs and record them again");
+  }
+
   void rates() {
     Names wrong;
     for (const auto& [name, run] : data_.raw) {
@@ -259,6 +273,7 @@ std::vector<Finding> fitness(const CampaignFile& file, const CampaignData& data)
   checks.speeds();
   checks.drifts();
   checks.thrusts();
+  checks.misread();
   checks.rates();
   return checks.take();
 }
