@@ -195,7 +195,8 @@ class RawImport {
         info_(info),
         options_(options),
         summary_(summary),
-        volts_(info) {}
+        volts_(info),
+        overlaps_(info) {}
 
   void add(const Run& run) {
     const fs::path path = raw_path(folder_, run);
@@ -219,6 +220,7 @@ class RawImport {
   void finish() {
     while (!in_work_.empty()) settle_oldest();
     for (const std::string& doubt : volts_.doubts()) summary_.doubts.push_back(doubt);
+    for (const std::string& doubt : overlaps_.doubts()) summary_.doubts.push_back(doubt);
   }
 
  private:
@@ -243,6 +245,7 @@ class RawImport {
     statistics.hash = raw->hash;
     check_statistics(statistics, info_, raw->npy.format(), raw->run, options_.allow_stuck);
     volts_.look_at(raw->run, raw->npy.format(), statistics);
+    overlaps_.look_at(raw->run, statistics);
     store_statistics(file_, raw->id, statistics);
     summary_.raw_runs += 1;
     summary_.frames += raw->npy.frames();
@@ -255,6 +258,7 @@ class RawImport {
   const ImportOptions& options_;
   ImportSummary& summary_;
   VoltDoubt volts_;
+  OverlapDoubt overlaps_;
   std::deque<std::unique_ptr<RunInWork>> in_work_;
 };
 

@@ -228,6 +228,31 @@ void VoltDoubt::look_at(const Run& run, const RawFormat& format, const RunStatis
   }
 }
 
+void OverlapDoubt::look_at(const Run& run, const RunStatistics& statistics) {
+  recordings_.push_back(
+      {run.run, run.line, run.start_s, run.start_s + statistics.elapsed_s(info_.daq.sample_rate_hz)});
+}
+
+Doubts OverlapDoubt::doubts() const {
+  std::vector<Recording> in_time = recordings_;
+  std::ranges::stable_sort(in_time, {}, &Recording::start_s);
+  std::size_t count = 0;
+  std::string first;
+  for (std::size_t i = 1; i < in_time.size(); ++i) {
+    const Recording &before = in_time[i - 1], &run = in_time[i];
+    // Times are often written to the minute, and a run may end as the next begins.
+    const double shorter_s = std::min(before.end_s - before.start_s, run.end_s - run.start_s);
+    if (before.end_s - run.start_s <= shorter_s / 2 || ++count > 1) continue;
+    first = fmt::format(
+        "runs.csv:{}: run {} begins {:.4g} s after run {}, which by its frames lasts {:.4g} s: are "
+        "daq.sample_rate_hz = {:g} and start_utc right?",
+        run.line, run.run, run.start_s - before.start_s, before.run, before.end_s - before.start_s,
+        info_.daq.sample_rate_hz);
+  }
+  if (count == 0) return {};
+  return {first + (count > 1 ? fmt::format(" It is so of {} runs", count) : "")};
+}
+
 Doubts VoltDoubt::doubts() const {
   if (runs_ == 0) return {};
   return {first_ + (runs_ > 1 ? fmt::format(" It is so in {} runs", runs_) : "")};

@@ -33,4 +33,23 @@ class VoltDoubt {
   std::size_t runs_ = 0;
 };
 
+/// Runs that begin while another is recorded, by its frames: a sampling rate in kHz, or times that are not.
+class OverlapDoubt {
+ public:
+  explicit OverlapDoubt(const CampaignInfo& info) : info_(info) {}
+
+  void look_at(const Run& run, const RunStatistics& statistics);
+  std::vector<std::string> doubts() const;
+
+ private:
+  struct Recording {
+    std::string run;
+    int line;
+    double start_s, end_s;
+  };
+
+  const CampaignInfo& info_;
+  std::vector<Recording> recordings_;
+};
+
 }  // namespace tunnelrig

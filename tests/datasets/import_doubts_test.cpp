@@ -162,6 +162,31 @@ TEST(ImportDoubts, VoltsBeyondTheConverterAreNoVolts) {
   EXPECT_THAT(volt_doubts({{300, 2734}}, SampleType::kInt16), IsEmpty()) << "counts are another rule's";
 }
 
+TEST(ImportDoubts, RunsDoNotBeginWithinOthers) {
+  const auto doubts_at = [](double rate_hz, const std::vector<double>& starts_s) {
+    CampaignInfo info = parse_campaign_toml(kToml, "campaign.toml");
+    info.daq.sample_rate_hz = rate_hz;
+    OverlapDoubt doubt(info);
+    int line = 2;
+    for (const double start_s : starts_s) {
+      tunnelrig::Run run;
+      run.run = fmt::format("R{}", line);
+      run.line = line++;
+      run.start_s = start_s;
+      RunStatistics statistics;
+      statistics.frames = 80000;
+      doubt.look_at(run, statistics);
+    }
+    return doubt.doubts();
+  };
+  EXPECT_THAT(doubts_at(4000. / 3, {0, 200, 120, 60}), IsEmpty()) << "to the minute, and in any order";
+  EXPECT_THAT(
+      doubts_at(4. / 3, {0, 120, 200}),
+      ElementsAre("runs.csv:3: run R3 begins 120 s after run R2, which by its frames lasts 6e+04 s: are "
+                  "daq.sample_rate_hz = 1.33333 and start_utc right? It is so of 2 runs"));
+  EXPECT_THAT(doubts_at(4000. / 3, {500, 500}), ElementsAre(HasSubstr("begins 0 s after run R2")));
+}
+
 TEST(ImportDoubts, ALocationStandsAtOnePlace) {
   const std::string head =
       "run,location,repeat,session,start_utc,raw,thrust_1_N,thrust_2_N,thrust_3_N,thrust_4_N,";
