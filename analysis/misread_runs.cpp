@@ -3,9 +3,7 @@
 #include "analysis/reduction.h"
 #include "analysis/upper_median.h"
 
-#include <algorithm>
 #include <cmath>
-#include <ranges>
 
 namespace tunnelrig {
 namespace {
@@ -71,11 +69,12 @@ MisreadRuns misread_runs(const CampaignData& data) {
   }
   for (const std::size_t r : thrusts) {
     const RunStatistics& statistics = data.statistics.at(data.runs[r].run);
-    const bool broken = std::ranges::any_of(std::views::iota(std::size_t{0}, rotors), [&](std::size_t c) {
+    bool broken = false;
+    for (std::size_t c = 0; c < rotors; ++c) {
       const ChannelStatistics& channel = statistics.channels[c];
       const double slope = data.certificate->force(static_cast<int>(c) + 1, channel.mean_V).d_voltage_N_per_V;
-      return std::abs(slope) * channel.standard_error_V > kUncertain * thrust_N[c];
-    });
+      broken |= std::abs(slope) * channel.standard_error_V > kUncertain * thrust_N[c];
+    }
     if (broken) result.broken_off.push_back(data.runs[r].run);
   }
   return result;

@@ -116,10 +116,6 @@ MatrixXd beside_others(const Observations& observations, const std::vector<int>&
                        const std::vector<Components>& columns, const std::vector<Components>& others) {
   const Index n = static_cast<Index>(rows.size()), c = observations.channels();
   const auto k = static_cast<Index>(columns.size()), all = k + static_cast<Index>(others.size());
-  std::map<int, std::vector<int>> places;
-  for (Index r = 0; r < n; ++r)
-    places[observations.group[static_cast<std::size_t>(rows[static_cast<std::size_t>(r)])]].push_back(
-        static_cast<int>(r));
   MatrixXd stacked(n * c, all);
   for (Index b = 0; b < all; ++b) {
     const Components& column =
@@ -127,7 +123,7 @@ MatrixXd beside_others(const Observations& observations, const std::vector<int>&
     stacked.col(b) = column[0](rows, Eigen::all).reshaped();
   }
   const MatrixXd slopes = observations.slopes(rows, Eigen::all);
-  for (const auto& [group, own] : places) {
+  for (const auto& [group, own] : places_of_each(observations.group, rows)) {
     MatrixXd baseline(static_cast<Index>(own.size()), 1 + slopes.cols());
     baseline << VectorXd::Ones(baseline.rows()), slopes(own, Eigen::all);
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(baseline);
