@@ -13,6 +13,9 @@ namespace tunnelrig {
 /// Collects names and says them in a sentence's length.
 class Names {
  public:
+  Names() = default;
+  explicit Names(std::vector<std::string> names) : names_(std::move(names)) {}
+
   void add(const std::string& name) { names_.push_back(name); }
   bool empty() const { return names_.empty(); }
   std::size_t size() const { return names_.size(); }

@@ -56,7 +56,8 @@ class Fitness : public Findings {
       return;
     }
     std::set<std::string> tared, all;
-    for (const std::size_t tare : tare_runs(data_)) tared.insert(data_.runs[tare].session);
+    for (const std::size_t tare : recorded_runs(data_, RunKind::kTare))
+      tared.insert(data_.runs[tare].session);
     for (const Run& run : data_.runs)
       if (run.kind == RunKind::kThrust && run.excluded.empty() && data_.raw.contains(run.run))
         all.insert(run.session);
@@ -221,9 +222,7 @@ class Fitness : public Findings {
 
   void misread() {
     const MisreadRuns runs = misread_runs(data_);
-    Names tares, broken;
-    for (const std::string& run : runs.loaded_tares) tares.add(run);
-    for (const std::string& run : runs.broken_off) broken.add(run);
+    const Names tares(runs.loaded_tares), broken(runs.broken_off);
     if (!tares.empty())
       problem("tares", "loaded like thrust runs: " + tares.text(),
               "correct their kind in runs.csv, or exclude them: they shift the zero of their session");

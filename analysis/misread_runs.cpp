@@ -32,25 +32,14 @@ OfRotors medians(const std::vector<OfRotors>& runs, std::size_t rotors) {
   return result;
 }
 
-std::vector<std::size_t> thrust_runs(const CampaignData& data) {
-  std::vector<std::size_t> result;
-  for (std::size_t r = 0; r < data.runs.size(); ++r) {
-    const Run& run = data.runs[r];
-    const auto raw = data.raw.find(run.run);
-    if (run.kind == RunKind::kThrust && run.excluded.empty() && data.statistics.contains(run.run) &&
-        raw != data.raw.end() && raw->second.state == RunState::kComplete)
-      result.push_back(r);
-  }
-  return result;
-}
-
 }  // namespace
 
 MisreadRuns misread_runs(const CampaignData& data) {
   constexpr std::size_t kFewestTares = 3;  // of two, nothing says which is the loaded one
   MisreadRuns result;
   const auto rotors = static_cast<std::size_t>(data.info.rig.rotors);
-  const std::vector<std::size_t> thrusts = thrust_runs(data), tares = tare_runs(data);
+  const std::vector<std::size_t> thrusts = recorded_runs(data, RunKind::kThrust),
+                                 tares = recorded_runs(data, RunKind::kTare);
   if (!data.certificate || thrusts.empty()) return result;
   const auto forces_of = [&](const std::vector<std::size_t>& runs) {
     std::vector<OfRotors> all;

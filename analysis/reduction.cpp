@@ -77,21 +77,21 @@ std::string why_not(const CampaignData& data, const Run& run, const RawRun& raw)
 
 }  // namespace
 
-std::vector<std::size_t> tare_runs(const CampaignData& data) {
-  std::vector<std::size_t> tares;
+std::vector<std::size_t> recorded_runs(const CampaignData& data, RunKind kind) {
+  std::vector<std::size_t> recorded;
   for (std::size_t r = 0; r < data.runs.size(); ++r) {
     const Run& run = data.runs[r];
     const auto raw = data.raw.find(run.run);
-    if (run.kind == RunKind::kTare && run.excluded.empty() && data.statistics.contains(run.run) &&
+    if (run.kind == kind && run.excluded.empty() && data.statistics.contains(run.run) &&
         raw != data.raw.end() && raw->second.state == RunState::kComplete)
-      tares.push_back(r);
+      recorded.push_back(r);
   }
-  return tares;
+  return recorded;
 }
 
 Tares tares_of(const CampaignData& data) {
   std::vector<TareReading> readings;
-  for (const std::size_t r : tare_runs(data)) {
+  for (const std::size_t r : recorded_runs(data, RunKind::kTare)) {
     const Run& run = data.runs[r];
     const RunStatistics& statistics = data.statistics.at(run.run);
     const std::vector<ChannelStatistics>& channels = statistics.channels;

@@ -84,10 +84,11 @@ struct Reduction {
 /// be, where raw runs have no calibration, and where a switched-on term lacks its measurement in some run.
 Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms);
 
-/// Indices in CampaignData::runs of what serves as tares: complete runs with motors stopped.
-std::vector<std::size_t> tare_runs(const CampaignData& data);
+/// Indices in CampaignData::runs of those of a kind that are recorded whole and not excluded. Tares among
+/// them serve as such: the motors are stopped.
+std::vector<std::size_t> recorded_runs(const CampaignData& data, RunKind kind);
 
-/// Their readings in the same order, each at its middle.
+/// The readings of the tares in the same order, each at its middle.
 Tares tares_of(const CampaignData& data);
 
 /// Total, C_T and U with their errors, from the thrusts.

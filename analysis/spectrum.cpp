@@ -239,7 +239,7 @@ std::string name_of_line(double frequency_hz, const std::vector<Origin>& known, 
     const double off_hz = frequency_hz - origin.hz;
     if (std::abs(off_hz) > tolerance_hz) continue;
     may_be_shaft |= origin.of_shaft && std::abs(off_hz) <= kMayBe * origin.sigma_hz;
-    if (may_be_shaft && origin.name.starts_with("mains")) break;  // they come last
+    if (may_be_shaft && is_mains(origin.name)) break;  // they come last
     const double likely =
         -0.5 * std::pow(off_hz / origin.sigma_hz, 2) - std::log(origin.sigma_hz) - origin.rarity;
     if (likely <= best) continue;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 namespace tunnelrig {
@@ -44,6 +45,9 @@ class WelchSpectrum {
   std::vector<float> taper_;
   std::vector<double> power_;
 };
+
+/// A line at the mains' frequency or one of its harmonics, by its name.
+inline bool is_mains(std::string_view name) { return name.starts_with("mains"); }
 
 /// What the lines of a run may be of.
 struct LineSources {

@@ -228,6 +228,11 @@ void VoltDoubt::look_at(const Run& run, const RawFormat& format, const RunStatis
   }
 }
 
+Doubts VoltDoubt::doubts() const {
+  if (runs_ == 0) return {};
+  return {first_ + (runs_ > 1 ? fmt::format(" It is so in {} runs", runs_) : "")};
+}
+
 void OverlapDoubt::look_at(const Run& run, const RunStatistics& statistics) {
   recordings_.push_back(
       {run.run, run.line, run.start_s, run.start_s + statistics.elapsed_s(info_.daq.sample_rate_hz)});
@@ -251,11 +256,6 @@ Doubts OverlapDoubt::doubts() const {
   }
   if (count == 0) return {};
   return {first + (count > 1 ? fmt::format(" It is so of {} runs", count) : "")};
-}
-
-Doubts VoltDoubt::doubts() const {
-  if (runs_ == 0) return {};
-  return {first_ + (runs_ > 1 ? fmt::format(" It is so in {} runs", runs_) : "")};
 }
 
 }  // namespace tunnelrig

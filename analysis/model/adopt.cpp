@@ -74,8 +74,8 @@ AmplitudeFit joint_fit_of(const Observations& observations, const Explanation& e
 struct Placed {
   Index column;
   double uncertainty;
-  std::size_t term;                // of curves: none of the effects
-  std::vector<double> deviations;  // of the jackknife; empty for curves
+  std::size_t term;                // whose it is; of a curve, which has no deviations, nothing
+  std::vector<double> deviations;  // of the jackknife
 };
 
 /// How two go together: those of one effect (an amplitude and its time constant lie on a ridge that is no

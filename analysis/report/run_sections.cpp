@@ -92,7 +92,7 @@ Json health_section(const Material& material) {
 Json tares_section(const Material& material) {
   Json readings = Json::array();
   const auto& certificate = material.data.certificate;
-  for (const std::size_t tare : tare_runs(material.data)) {
+  for (const std::size_t tare : recorded_runs(material.data, RunKind::kTare)) {
     const Run& run = material.data.runs[tare];
     Json reading{{"run", run.run}, {"session", run.session}, {"start_s", run.start_s}};
     for (int rotor = 0; rotor < material.data.info.rig.rotors; ++rotor) {

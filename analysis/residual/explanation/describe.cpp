@@ -110,32 +110,29 @@ std::vector<Drawn> drawn_curve(const Curve& curve, const std::vector<double>& pl
   return points;
 }
 
-/// Of each of `columns`, what neither the group's constant and slopes nor `others` can make: rows × columns,
-/// channel below channel.
-MatrixXd beside_others(const Observations& observations, const std::vector<int>& rows,
-                       const std::vector<Components>& columns, const std::vector<Components>& others) {
-  const Index n = static_cast<Index>(rows.size()), c = observations.channels();
-  const auto k = static_cast<Index>(columns.size()), all = k + static_cast<Index>(others.size());
-  MatrixXd stacked(n * c, all);
-  for (Index b = 0; b < all; ++b) {
-    const Components& column =
-        b < k ? columns[static_cast<std::size_t>(b)] : others[static_cast<std::size_t>(b - k)];
-    stacked.col(b) = column[0](rows, Eigen::all).reshaped();
-  }
+/// The runs' means of each column, channel below channel.
+MatrixXd stacked(const std::vector<Components>& columns, const std::vector<int>& rows, Index channels) {
+  MatrixXd result(static_cast<Index>(rows.size()) * channels, static_cast<Index>(columns.size()));
+  for (std::size_t b = 0; b < columns.size(); ++b)
+    result.col(static_cast<Index>(b)) = columns[b][0](rows, Eigen::all).reshaped();
+  return result;
+}
+
+/// Of stacked columns, what the groups' constants and slopes cannot make.
+MatrixXd beside_baseline(const Observations& observations, const std::vector<int>& rows, MatrixXd columns) {
+  const auto n = static_cast<Index>(rows.size());
   const MatrixXd slopes = observations.slopes(rows, Eigen::all);
   for (const auto& [group, own] : places_of_each(observations.group, rows)) {
     MatrixXd baseline(static_cast<Index>(own.size()), 1 + slopes.cols());
     baseline << VectorXd::Ones(baseline.rows()), slopes(own, Eigen::all);
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(baseline);
-    for (Index channel = 0; channel < c; ++channel) {
-      auto part = stacked.middleRows(channel * n, n);
+    for (Index channel = 0; channel < observations.channels(); ++channel) {
+      auto part = columns.middleRows(channel * n, n);
       const MatrixXd given = part(own, Eigen::all);
       part(own, Eigen::all) = given - baseline * solver.solve(given);
     }
   }
-  const MatrixXd left = stacked.rightCols(all - k);
-  if (left.cols() == 0) return stacked;
-  return stacked.leftCols(k) - left * left.completeOrthogonalDecomposition().solve(stacked.leftCols(k));
+  return columns;
 }
 
 /// What of a curve the baseline or the rest of the model can do as well may be of any size in the fit, and be
@@ -145,14 +142,16 @@ void keep_to_its_own_size(const Observations& observations, const std::vector<in
                           const std::vector<Components>& others, const Curve& curve, VectorXd& amplitude,
                           MatrixXd& covariance) {
   constexpr double kWider = 2;
-  const MatrixXd own = beside_others(observations, rows, curve.columns, others);
-  const auto k = static_cast<Index>(curve.columns.size());
-  MatrixXd whole(own.rows(), k);
-  for (Index b = 0; b < k; ++b)
-    whole.col(b) = curve.columns[static_cast<std::size_t>(b)][0](rows, Eigen::all).reshaped();
+  MatrixXd whole = stacked(curve.columns, rows, observations.channels());
+  MatrixXd own = beside_baseline(observations, rows, whole);
+  if (!others.empty()) {
+    const MatrixXd rest = beside_baseline(observations, rows, stacked(others, rows, observations.channels()));
+    own -= rest * rest.completeOrthogonalDecomposition().solve(own);
+  }
   whole.rowwise() -= whole.colwise().mean().eval();
   const double own_square = (own * amplitude).squaredNorm();
   if (!(own_square > 0)) return;
+  const auto k = static_cast<Index>(curve.columns.size());
   const MatrixXd precision = whole.transpose() * whole / (kWider * kWider * own_square);
   const Eigen::PartialPivLU<MatrixXd> shrink(MatrixXd::Identity(k, k) + covariance * precision);
   amplitude = shrink.solve(amplitude).eval();
@@ -257,10 +256,12 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
     pieces.push_back(drawn_levels(curve));
   else if (within)
     pieces.push_back(drawn_curve(curve, places_to_draw({}, 0, duration_s), 0, duration_s));
-  else
+  else {
+    const std::vector<double> seen = values_seen(curve, rows);
     for (const Stretch& stretch : stretches_of(observations, rows, curve))
-      pieces.push_back(drawn_curve(curve, places_to_draw(values_seen(curve, rows), stretch.low, stretch.high),
-                                   curve.low, curve.high));
+      pieces.push_back(
+          drawn_curve(curve, places_to_draw(seen, stretch.low, stretch.high), curve.low, curve.high));
+  }
   for (std::vector<Drawn>& points : pieces) {
     if (!result.levels) take_out_baseline(observations, rows, curve, points);
     if (!curve.strength) centre(points);

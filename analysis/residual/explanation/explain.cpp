@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -128,20 +129,21 @@ bool baseline_does_better(const Explanation& explanation) {
 }
 
 Refuted refuted(const Explanation& explanation, const Observations& observations) {
-  std::vector<const AdoptedEffect*> against;
+  std::vector<std::pair<const AdoptedEffect*, std::string>> against;  // and why
   bool refutable = false;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     refutable = refutable || !adopted.term.effect->theory_only;
-    if (!refutation(adopted, observations).empty()) against.push_back(&adopted);
+    if (std::string why = refutation(adopted, observations); !why.empty())
+      against.emplace_back(&adopted, std::move(why));
   }
   // With the wrong one of two equals in, the sealed runs are far from all that was found, and no other effect
   // is seen beside it: what has equals goes first, and the rest is judged beside the one that is left.
-  const auto has_equals = [](const AdoptedEffect* adopted) { return !adopted->confounded_with.empty(); };
+  const auto has_equals = [](const auto& refuted) { return !refuted.first->confounded_with.empty(); };
   if (std::ranges::any_of(against, has_equals)) std::erase_if(against, std::not_fn(has_equals));
   Refuted result;
-  for (const AdoptedEffect* adopted : against) {
+  for (auto& [adopted, why] : against) {
     result.terms.push_back(adopted->term);
-    result.why.push_back(refutation(*adopted, observations));
+    result.why.push_back(std::move(why));
     result.at_bound |= adopted->at_bound;
     result.structure |= adopted->bends_away || adopted->anywhere;
   }

@@ -169,6 +169,12 @@ bool has_settled(const MeanModel& before, const MeanModel& after) {
 
 }  // namespace
 
+MeanModel MeanModel::without_term(std::size_t t) const {
+  MeanModel rest = *this;
+  rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(t));
+  return rest;
+}
+
 Components response_components(const Observations& observations) {
   Components result = {observations.y};
   result.insert(result.end(), observations.shape.begin(), observations.shape.end());

@@ -13,6 +13,8 @@ namespace tunnelrig {
 struct MeanModel {
   std::vector<Term> terms;
   std::vector<Curve> curves;
+
+  MeanModel without_term(std::size_t t) const;
 };
 
 /// A mean model at its parameters, ready for linear algebra: what the terms add, and columns for everything

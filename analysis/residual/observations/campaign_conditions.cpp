@@ -1,6 +1,7 @@
 #include "analysis/residual/observations/campaign_conditions.h"
 
 #include "analysis/effects/effect.h"
+#include "analysis/spectrum.h"
 #include "datasets/locations.h"
 
 #include <algorithm>
@@ -30,7 +31,7 @@ class AtZero {
  public:
   AtZero(const CampaignData& data, const Reduction& reduction, const std::vector<std::size_t>& order,
          const Observations& observations)
-      : data_(data), tares_(tare_runs(data)), observations_(observations) {
+      : data_(data), tares_(recorded_runs(data, RunKind::kTare)), observations_(observations) {
     for (const std::size_t r : order) runs_.push_back(&reduction.runs[r]);
   }
 

@@ -18,9 +18,6 @@ std::optional<double> condition(const Run& run, const std::string& name);
 /// Of those of a channel's lines together whose name `chosen` accepts.
 double amplitude_of_lines_V(const ChannelStatistics& channel, bool (*chosen)(std::string_view name));
 
-/// A line at the mains' frequency or one of its harmonics.
-inline bool is_mains(std::string_view name) { return name.starts_with("mains"); }
-
 /// Sets Covariate::at_zero of what effects of a zero follow, where runs have their zero by tares. `order`: of
 /// reduction.runs, by row. A tare whose row of the sheet lacks a condition counts as having that of the run
 /// of its session nearest in time, and `left_out` says so.

@@ -1,6 +1,7 @@
 #include "analysis/conventions.h"
 #include "analysis/reduction.h"
 #include "analysis/residual/observations/campaign_conditions.h"
+#include "analysis/spectrum.h"
 #include "datasets/error.h"
 #include "datasets/locations.h"
 #include "datasets/open_space.h"

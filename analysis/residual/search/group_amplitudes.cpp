@@ -66,6 +66,12 @@ Observations without_own(const Observations& observations, const MeanModel& mode
   return fewer;
 }
 
+std::vector<int> groups_among(const Observations& observations, const std::vector<int>& rows) {
+  std::vector<int> groups;
+  for (const auto& [group, own] : rows_of_each(observations.group, rows)) groups.push_back(group);
+  return groups;
+}
+
 std::vector<Components> columns_by_group(const Components& column, const Observations& observations,
                                          const std::vector<int>& groups, const MixedModel& mixed) {
   std::vector<Components> result;

@@ -37,6 +37,9 @@ Eigen::Index place_among_own(const MeanModel& model, std::size_t t);
 /// The data without the column of term t.
 Observations without_own(const Observations& observations, const MeanModel& model, std::size_t t);
 
+/// The numbers of the groups that `rows` are of.
+std::vector<int> groups_among(const Observations& observations, const std::vector<int>& rows);
+
 /// A candidate's columns, each in one of `groups` alone; without those that `mixed` does not see.
 std::vector<Components> columns_by_group(const Components& column, const Observations& observations,
                                          const std::vector<int>& groups, const MixedModel& mixed);

@@ -133,6 +133,8 @@ class Search {
   bool change_a_form();
   /// What swaps try, beside the model without the term, and what they do then.
   JointFit fit_beside(const JointFit& without, const Scan& scan, std::size_t way);
+  /// Of `accepted`, whose term is the model's last.
+  void make_newest(std::size_t t);
   void put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, double p);
   double evidence_of(const Scan& scan, const Term& term) const;
   JointFit fit_without(std::size_t t) const { return fit_without(t, observations_); }

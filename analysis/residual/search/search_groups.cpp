@@ -31,8 +31,7 @@ Search::Scan Search::scan_effects_and_groups(const JointFit& base) const {
 
 void Search::add_group_ways(Scan& scan) const {
   constexpr std::size_t kMostGroups = 24;
-  std::vector<int> groups;
-  for (const auto& [group, rows] : rows_of_each(observations_.group, rows_)) groups.push_back(group);
+  const std::vector<int> groups = groups_among(observations_, rows_);
   if (groups.size() < 2 || groups.size() > kMostGroups) return;
   const std::size_t alike = scan.ways.size();
   for (std::size_t i = 0; i < alike; ++i) {
@@ -93,15 +92,11 @@ bool Search::let_groups_differ(std::size_t t, bool before_others) {
   if (!observations_.from_table || observations_.groups() < 2) return false;
   const Term term = result_.accepted[t].term;
   if (term.per_group || term.effect->theory_only) return false;
-  const auto place = static_cast<std::ptrdiff_t>(t);
-  MeanModel others = fit_.model;
-  others.terms.erase(others.terms.begin() + place);
-  InGroups own = fit_in_groups(term, std::move(others));
+  InGroups own = fit_in_groups(term, fit_.model.without_term(t));
   if (p_of_groups(observations_, fit_, own.observations, own.fit) > settings_.alpha ||
       !gain_of(own, before_others))
     return false;
-  const auto first = result_.accepted.begin() + place;
-  std::rotate(first, first + 1, result_.accepted.end());
+  make_newest(t);
   take(std::move(own));
   return true;
 }

@@ -80,11 +80,15 @@ JointFit Search::fit_beside(const JointFit& without, const Scan& scan, std::size
 void Search::put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, double p) {
   const auto rmse_of = [this](const JointFit& fit) { return unseen(fit, fit.variances).rmse(); };
   fit_ = tried;
-  const auto place = result_.accepted.begin() + static_cast<std::ptrdiff_t>(t);
-  std::rotate(place, place + 1, result_.accepted.end());  // the new term is the model's last
+  make_newest(t);
   result_.accepted.back().p = p;
   result_.accepted.back().gain = rmse_of(without) - rmse_of(fit_);
   read_back_terms();
+}
+
+void Search::make_newest(std::size_t t) {
+  const auto place = result_.accepted.begin() + static_cast<std::ptrdiff_t>(t);
+  std::rotate(place, place + 1, result_.accepted.end());
 }
 
 double Search::evidence_of(const Scan& scan, const Term& term) const {
@@ -95,9 +99,7 @@ double Search::evidence_of(const Scan& scan, const Term& term) const {
 }
 
 JointFit Search::fit_without(std::size_t t, const Observations& observations) const {
-  MeanModel model = fit_.model;
-  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(t));
-  return fit_jointly(observations, model, rows_);
+  return fit_jointly(observations, fit_.model.without_term(t), rows_);
 }
 
 }  // namespace tunnelrig

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <optional>
 #include <set>
 
 namespace tunnelrig {
@@ -54,11 +55,11 @@ StepProfile step_profile(const Observations& given, const MeanModel& model, std:
   StepProfile profile;
   if (possible.empty()) return profile;
   Term step = model.terms[t];
-  const Observations observations = step.per_group ? without_own(given, model, t) : given;
-  std::vector<int> groups;
-  for (const auto& [group, own] : rows_of_each(observations.group, rows)) groups.push_back(group);
-  MeanModel rest = model;
-  rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(t));
+  std::optional<Observations> fewer;
+  if (step.per_group) fewer = without_own(given, model, t);
+  const Observations& observations = fewer ? *fewer : given;
+  const std::vector<int> groups = groups_among(observations, rows);
+  const MeanModel rest = model.without_term(t);
   const Forces forces = predict_forces(observations, rest, rows);
   const LinearModel linear = linearise(observations, rest, forces);
   const Components y = difference(response_components(observations), linear.offset);
