@@ -133,7 +133,7 @@ Adoption adopt(const Observations& observations, const Explanation& explanation,
                     "left to score it by",
                     curve.label()));
   if (explanation.adopted.empty() && !curves_wanted) {
-    if (explanation.unknown.size() > explanation.by_sealed_too.size())
+    if (std::ranges::any_of(explanation.unknown, &UnknownStructure::is_curve_of_model))
       result.notes.emplace_back("what was found has no name; --adopt-empirical adopts it as a curve");
     return result;
   }

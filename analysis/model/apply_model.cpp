@@ -82,20 +82,11 @@ class Forward {
 
   /// What the cells would read of forces F.
   VectorXd reading(Index row, const VectorXd& force_N, const VectorXd& parameters) const {
-    VectorXd result = force_N;
+    VectorXd result =
+        model_.multiplicative ? multiplied(row, force_N, parameters) : added_to(row, force_N, parameters);
     for (Index c = 0; c < force_N.size(); ++c) {
-      double factor = 1, added = 0;
-      for (const std::size_t t : order_) {
-        if (!applies(t, row, c)) continue;
-        const bool previous = model_.terms[t].effect->needs_previous;
-        // What depends on the run before is judged by predictions, or its sign would follow the scatter.
-        const double from = previous ? predicted_(row, c) : force_N(c) + added;
-        const double to = mean_changed(t, row, c, from, force_N, parameters);
-        model_.multiplicative ? factor *= to / from : added += to - from;
-      }
       const double curves = curve_sum(row, c, parameters);
-      model_.multiplicative ? factor *= std::exp(curves) : added += curves;
-      result(c) = force_N(c) * factor + added;
+      model_.multiplicative ? result(c) *= std::exp(curves) : result(c) += curves;
     }
     return result;
   }
@@ -117,6 +108,54 @@ class Forward {
   }
 
  private:
+  /// Each effect acts on what those before it have made of the forces. What depends on the run before is
+  /// judged by predictions, or its sign would follow the scatter, and nothing acts on it.
+  VectorXd added_to(Index row, const VectorXd& force_N, const VectorXd& parameters) const {
+    VectorXd made = force_N, by_previous = VectorXd::Zero(force_N.size());
+    for (const std::size_t t : order_) {
+      const bool previous = needs_previous(t);
+      const VectorXd from = previous ? VectorXd(predicted_.row(row)) : made;
+      for (Index c = 0; c < force_N.size(); ++c)
+        if (applies(t, row, c))
+          (previous ? by_previous : made)(c) += mean_changed(t, row, c, from, parameters) - from(c);
+    }
+    return made + by_previous;
+  }
+
+  /// Of logarithms, as the model is fitted: each effect acts on what all others have made, found in turns.
+  VectorXd multiplied(Index row, const VectorXd& force_N, const VectorXd& parameters) const {
+    const Index channels = force_N.size();
+    Eigen::ArrayXXd own = Eigen::ArrayXXd::Ones(channels, static_cast<Index>(order_.size()));
+    double change = 1;
+    for (int turn = 0; turn < kMostInversions && change > kConverged; ++turn) {
+      change = 0;
+      for (std::size_t k = 0; k < order_.size(); ++k) {
+        const std::size_t t = order_[k];
+        if (needs_previous(t)) continue;
+        const VectorXd from = force_N.array() * without_column(own, static_cast<Index>(k));
+        for (Index c = 0; c < channels; ++c) {
+          if (!applies(t, row, c)) continue;
+          const double share = mean_changed(t, row, c, from, parameters) / from(c);
+          change = std::max(change, std::abs(share - own(c, static_cast<Index>(k))));
+          own(c, static_cast<Index>(k)) = share;
+        }
+      }
+    }
+    for (std::size_t k = 0; k < order_.size(); ++k)
+      for (Index c = 0; c < channels && needs_previous(order_[k]); ++c)
+        if (applies(order_[k], row, c))
+          own(c, static_cast<Index>(k)) =
+              mean_changed(order_[k], row, c, predicted_.row(row), parameters) / predicted_(row, c);
+    return force_N.array() * own.rowwise().prod();
+  }
+
+  static Eigen::ArrayXd without_column(Eigen::ArrayXXd factors, Index column) {
+    factors.col(column).setOnes();
+    return factors.rowwise().prod();
+  }
+
+  bool needs_previous(std::size_t t) const { return model_.terms[t].effect->needs_previous; }
+
   bool in_tunnel(Index row) const { return observations_.in_tunnel[static_cast<std::size_t>(row)]; }
 
   /// By the baseline and the model, for what depends on the run before.
@@ -147,8 +186,10 @@ class Forward {
                         [&](const Covariate* c) { return c == nullptr || std::isnan(c->at(row, channel)); });
   }
 
-  double mean_changed(std::size_t t, Index row, Index channel, double force_N, const VectorXd& forces_N,
+  /// `forces_N`: of all rotors, which the effect acts on.
+  double mean_changed(std::size_t t, Index row, Index channel, const VectorXd& forces_N,
                       const VectorXd& parameters) const {
+    const double force_N = forces_N(channel);
     const ModelTerm& term = model_.terms[t];
     std::vector<double> x;
     for (const Covariate* covariate : term_covariates_[t]) x.push_back(covariate->at(row, channel));

@@ -105,9 +105,28 @@ TEST(ApplyModel, WhereEffectsAddEachActsOnWhatThoseBeforeItMade) {
     const double creep = 1 + c * (1 - std::exp(-*given.number("time_since_motor_start_s") / tau));
     const double air = *given.number("air_pressure_Pa") / 101325;
     const auto& force = run.thrust_N;
-    EXPECT_NEAR(force[0] * air * creep + x * force[1], *given.thrust_N[0], 1e-9);
+    EXPECT_NEAR(force[0] * air * creep + x * force[1] * air * creep, *given.thrust_N[0], 1e-9);
     EXPECT_NEAR(force[1] * air * creep, *given.thrust_N[1], 1e-9);
   }
+}
+
+/// A factor beside it makes a drift of the zero neither larger nor smaller: as the model is fitted.
+TEST(ApplyModel, WhatIsAddedIsNotMultiplied) {
+  const CampaignData data = four_runs();
+  const double c = 0.3, tau = 100;
+  const ModelTerm drift = term("zero_drift_time", {0.02}, {0}), creep = term("creep", {c, tau}, {100});
+  const Reduction with_drift = corrected(data, model_of({drift}));
+  const Reduction with_both = corrected(data, model_of({drift, creep}));
+  ASSERT_EQ(with_both.runs.size(), 4u);
+  double most = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const tunnelrig::Run& given = data.runs[with_both.runs[i].run];
+    const double by_creep = 1 + c * (1 - std::exp(-*given.number("time_since_motor_start_s") / tau));
+    const double added_N = *given.thrust_N[0] - with_drift.runs[i].thrust_N[0];
+    most = std::max(most, std::abs(added_N));
+    EXPECT_NEAR(with_both.runs[i].thrust_N[0] * by_creep + added_N, *given.thrust_N[0], 1e-9);
+  }
+  EXPECT_GT(most, 1e-4);
 }
 
 TEST(ApplyModel, ACurveIsTakenOutAndHeldBeyondItsRange) {

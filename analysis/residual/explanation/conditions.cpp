@@ -106,7 +106,8 @@ void warn_of_unseen(const Observations& observations, const std::vector<const Ef
   }
 }
 
-void warn_of_collinear(const Observations& observations, Explanation& explanation) {
+void warn_of_collinear(const Observations& observations, const std::vector<const Effect*>& effects,
+                       Explanation& explanation) {
   for (std::size_t a = 0; a < observations.covariates.size(); ++a)
     for (std::size_t b = a + 1; b < observations.covariates.size(); ++b) {
       const Covariate &first = observations.covariates[a], &second = observations.covariates[b];
@@ -118,11 +119,11 @@ void warn_of_collinear(const Observations& observations, Explanation& explanatio
       explanation.warnings.push_back(
           fmt::format("{} and {} go together (correlation {:.4f}): effects of the two cannot be told apart",
                       first.name, second.name, together));
-      for (const Effect& effect : all_effects())
-        for (const std::string& covariate : effect.covariates)
+      for (const Effect* effect : effects)
+        for (const std::string& covariate : effect->covariates)
           if (covariate == second.name || covariate == first.name)
             explanation.untestable.push_back(
-                {effect.name,
+                {effect->name,
                  fmt::format("{} is collinear with {}: it is tried, but not on its own", covariate,
                              covariate == first.name ? second.name : first.name),
                  {}});
@@ -183,7 +184,7 @@ void report_untestable(const Observations& observations, const std::vector<const
     if (entry.reason.starts_with(kNoValue))
       explanation.warnings.push_back(fmt::format("{} is not tried: {}", entry.effect, entry.reason));
   warn_of_unseen(observations, effects, rows, explanation);
-  warn_of_collinear(observations, explanation);
+  warn_of_collinear(observations, effects, explanation);
 }
 
 void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation) {

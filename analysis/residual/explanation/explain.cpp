@@ -55,14 +55,22 @@ std::vector<SuspectRow> rows_of(const std::vector<IsolatedValue>& values) {
   return rows;
 }
 
-/// A campaign's runs are many, and its conditions are typed by hand: one that is a slip goes with its run.
+/// A campaign's runs are many, and its conditions are typed by hand: one that is a slip goes with its run. A
+/// run whose thrust is far off as well may have been under that condition: it stays, and it is said.
 void set_mistyped_aside(SetAside& aside, std::vector<std::string>& said) {
   const std::vector<IsolatedValue> values = mistyped_values(aside.kept);
+  std::vector<IsolatedValue> others = isolated_values(aside.kept);
+  std::erase_if(others, [&](const IsolatedValue& other) {
+    return std::ranges::any_of(values, [&](const IsolatedValue& value) {
+      return value.row == other.row && value.covariate == other.covariate;
+    });
+  });
   const std::vector<SuspectRow> rows = rows_of(values);
   const bool few = rows.size() <= aside.room();
   if (few) aside.take(rows);
   for (const IsolatedValue& value : values)
     said.push_back(in_words(value, few ? "set aside; a typing error?" : "a typing error?"));
+  for (const IsolatedValue& value : others) said.push_back(in_words(value, "a typing error?"));
 }
 
 /// A condition far from all others is said. Where the model found with such rows predicts worse than none, it

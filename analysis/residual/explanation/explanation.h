@@ -75,7 +75,13 @@ struct UnknownStructure {
   std::vector<std::string> labels;      // of a column of texts: x = i + 1 stands for labels[i]
   std::vector<std::string> instead_of;  // effects over this covariate that do not follow it
   bool by_sealed_too = false;           // the open blocks alone do not show it
+  bool in_some_runs = false;            // found in those that have the condition
   std::vector<Term> could_be;  // names that go with it so nearly, or come so late, that none is given
+
+  /// Whether it is a curve that the model can have, and errors can be given with.
+  bool is_curve_of_model() const {
+    return !by_sealed_too && !in_some_runs && !shape.empty() && covariate != "session";
+  }
 };
 
 struct Untestable {

@@ -128,9 +128,7 @@ std::string errors_in_words(const Explanation& e) {
       e.noise_floor);
   if (!e.empirical.empty())
     text += fmt::format("after is with the empirical curve over {}\n", fmt::join(e.empirical, ", "));
-  const bool scored = std::ranges::any_of(e.unknown, [](const UnknownStructure& u) {
-    return !u.by_sealed_too && !u.shape.empty() && u.covariate != "session";
-  });
+  const bool scored = std::ranges::any_of(e.unknown, &UnknownStructure::is_curve_of_model);
   if (scored && e.empirical.empty())
     text += "what has no name is in neither: --adopt-empirical gives the error with its curves\n";
   return text;

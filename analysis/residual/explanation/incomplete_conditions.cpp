@@ -112,8 +112,15 @@ Explanation without_names_of_incomplete(Explanation explanation, const Observati
     again.untestable = std::move(explanation.untestable);
     explanation = std::move(again);
   }
-  for (UnknownStructure& unknown : structure_over(incomplete, complete, std::move(there), effects, settings))
+  for (UnknownStructure& unknown :
+       structure_over(incomplete, complete, std::move(there), effects, settings)) {
+    unknown.in_some_runs = true;
     explanation.unknown.push_back(std::move(unknown));
+  }
+  std::erase_if(explanation.warnings, [&](const std::string& warning) {  // that it cannot be seen
+    return std::ranges::any_of(
+        incomplete, [&](const std::string& name) { return warning.starts_with(name + " is missing"); });
+  });
   explanation.verdict = verdict_of(explanation);
   said.push_back(fmt::format("in the {} of {} {} that have {}, {} is found{}: fill in what is missing",
                              complete.rows(), observations.rows(), observations.from_table ? "rows" : "runs",

@@ -96,7 +96,11 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
                        .amplitude = {}};
   if (observations.blocks() > 1) {
     const HeldOutErrors predicted = left_out(observations, fit, rows);
-    if (predicted.count() > 0) errors = predicted;
+    if (predicted.count() > 0) {
+      errors = predicted;
+      explanation.noise_floor =
+          rms(predicted.error.array().isNaN().select(predicted.error, predicted.expected_std));
+    }
   }
   set_interval(observations, errors, {}, settings.seed, explanation.before);
   explanation.after = explanation.before;
@@ -152,7 +156,7 @@ Fitted fairest_baseline(const Observations& given, const Observations& alone, co
 
 void report_search(const Attribution& found, const Observations& observations, const SearchSettings& settings,
                    Explanation& explanation) {
-  if (static_cast<int>(found.accepted.size()) >= settings.most_effects)
+  if (!found.accepted.empty() && static_cast<int>(found.accepted.size()) >= settings.most_effects)
     explanation.warnings.push_back(
         fmt::format("the search ended with {} effects, as many as --max-effects allows: where there are "
                     "more, these may be wrong; try more",

@@ -43,10 +43,14 @@ MatrixXd variance_of_runs(const Observations& observations, const NullFit& varia
   return result;
 }
 
-/// Of a normal distribution, by sizes of deviations that a few gross ones may be among.
+/// Of a normal distribution, by sizes of deviations from medians that a few gross ones may be among. The run
+/// that is the median of its location deviates by 0, and so does one that stands alone: they say nothing of
+/// it.
 double sigma_by_median(const VectorXd& sizes) {
   constexpr double kMedianOfNormal = 0.6745;
-  return upper_median({sizes.begin(), sizes.end()}) / kMedianOfNormal;
+  std::vector<double> deviations(sizes.begin(), sizes.end());
+  std::erase(deviations, 0.0);
+  return deviations.empty() ? 0 : upper_median(std::move(deviations)) / kMedianOfNormal;
 }
 
 /// σ. A campaign has some 1,700 values that are not typed by hand. Of Student's t with three degrees of

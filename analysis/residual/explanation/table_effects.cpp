@@ -44,15 +44,17 @@ void bound_by(double limit, EffectParameter& parameter) {
 
 /// With the bounds that hold for this table's response, where they are others. What a drift of the zero can
 /// be is known of volts: in counts or newtons it depends on the converter and the cell, and only the sign is
-/// left. A cell that bends by more than a tenth over its range is none.
+/// left. An offset larger than all that was read is none: over the few speeds of one setting any would do. A
+/// cell that bends by more than a tenth over its range is none.
 std::optional<Effect> bounded_as_here(const Effect& effect, const Observations& observations) {
   constexpr double kNoBound = 1e12, kMostBent = 0.1;
+  const double most_read = observations.value.cwiseAbs().maxCoeff();
   Effect own = effect;
   bool differs = false;
   for (EffectParameter& parameter : own.parameters) {
     const bool in_volts = parameter.in_volts() && observations.unit != "V";
     const bool per_newton = parameter.per_newton() && observations.unit != "N";
-    if (in_volts) bound_by(kNoBound, parameter);
+    if (in_volts) bound_by(effect.name == "zero_offset" ? most_read : kNoBound, parameter);
     if (per_newton)
       bound_by(kMostBent / (observations.value.maxCoeff() - observations.value.minCoeff()), parameter);
     differs |= in_volts || per_newton;

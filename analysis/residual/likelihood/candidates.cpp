@@ -7,7 +7,7 @@
 
 #include <algorithm>
 #include <array>
-#include <set>
+#include <map>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -17,15 +17,20 @@ namespace {
 
 using Eigen::MatrixXd;
 
-/// Whether a group has rows before this one and from it on: a step between groups is their difference.
-bool is_within_a_group(const Observations& observations, const std::vector<int>& rows, double first) {
-  std::set<int> before;
-  return std::any_of(rows.begin(), rows.end(), [&](int row) {
-    const int group = observations.group[static_cast<std::size_t>(row)];
-    if (row >= first) return before.contains(group);
-    before.insert(group);
-    return false;
-  });
+/// Of rising numbers of rows, those with a group that has rows before and from there on: a step between
+/// groups is their difference.
+std::vector<double> within_a_group(const Observations& observations, const std::vector<int>& rows,
+                                   const std::vector<double>& points) {
+  const std::map<int, std::vector<int>> of_groups = rows_of_each(observations.group, rows);
+  std::vector<double> result;
+  auto next = rows.begin();
+  int last = -1;  // row of any group that has rows before the point
+  for (const double point : points) {
+    for (; next != rows.end() && *next < point; ++next)
+      last = std::max(last, of_groups.at(observations.group[static_cast<std::size_t>(*next)]).back());
+    if (last >= point) result.push_back(point);
+  }
+  return result;
 }
 
 /// Run numbers at which a change-point leaves enough blocks of `rows` on both sides: the first run of each
@@ -46,9 +51,9 @@ std::vector<double> change_points(const Observations& observations, const std::v
   const double least = kLeastShareBesideAStep * static_cast<double>(rows.size());
   std::erase_if(points, [&](double point) {
     const auto before = static_cast<double>(std::ranges::lower_bound(rows, point) - rows.begin());
-    return before < least || static_cast<double>(rows.size()) - before < least ||
-           !is_within_a_group(observations, rows, point);
+    return before < least || static_cast<double>(rows.size()) - before < least;
   });
+  points = within_a_group(observations, rows, points);
   constexpr std::size_t kMost = 300;
   const std::size_t every = std::max<std::size_t>(1, (points.size() + kMost - 1) / kMost);
   std::vector<double> some;
@@ -63,19 +68,25 @@ bool forces_differ(const Observations& observations) {
   if (observations.rows() <= observations.groups()) return true;
   const bool correlated = observations.scatter.run_correlation != std::array<double, 2>{0, 0};
   const double least = correlated ? 40 : 3;  // variance over that of the constants' errors
-  const MatrixXd predicted =
-      predict_response(observations, {known_terms(observations), {}}, observations.all_rows());
+  std::vector<int> seen;
+  for (const int row : observations.all_rows())
+    if (observations.has_response(row)) seen.push_back(row);
+  const MatrixXd predicted = predict_response(observations, {known_terms(observations), {}}, seen);
   const MatrixXd force = observations.multiplicative ? MatrixXd(predicted.array().log()) : predicted;
   const double variance = (force.rowwise() - force.colwise().mean()).squaredNorm();
   return variance > least * variance_of_constants(observations, predicted).sum();
 }
 
-/// What the air's state does to a force, or to a cell whose own temperature is not known.
-bool is_of_air_or_of_a_cell_in_it(const Effect& effect) {
-  constexpr std::array<std::string_view, 4> kOfAir = {"air_humidity", "air_pressure", "air_temperature",
-                                                      "temperature_gradient"};
+/// What the air's temperature does to a cell whose own is not known.
+bool is_of_a_cell_in_the_air(const Effect& effect) {
   const bool drift = effect.name == "span_drift_temperature" || effect.name == "zero_drift_temperature";
-  return std::ranges::count(kOfAir, effect.name) > 0 || (drift && effect.form == "air");
+  return effect.name == "temperature_gradient" || (drift && effect.form == "air");
+}
+
+/// What the air's state does to a force.
+bool is_of_air(const Effect& effect) {
+  constexpr std::array<std::string_view, 3> kOfAir = {"air_humidity", "air_pressure", "air_temperature"};
+  return std::ranges::count(kOfAir, effect.name) > 0;
 }
 
 /// Whether the response is a thrust that its measured speed, and the density of its air, make C_T; another
@@ -93,10 +104,13 @@ bool shows_zero_offset(const Observations& observations) {
          (is_made_c_t(observations) || thrust);
 }
 
+bool is_of(std::string_view quantity, const Observations& observations) {
+  return observations.from_table && unit_from_name(observations.unit).quantity == quantity;
+}
+
 /// Powers go with its cube, and what is neither a force nor read by a cell has no such theory.
 bool goes_with_speed_squared(const Observations& observations) {
-  if (!observations.from_table) return true;
-  return !observations.of_no_cell && unit_from_name(observations.unit).quantity != "power";
+  return !observations.from_table || !(observations.of_no_cell || is_of("power", observations));
 }
 
 }  // namespace
@@ -129,12 +143,16 @@ Testability testability(const Effect& effect, const Observations& observations) 
     result.reason =
         "only a table's thrust, coefficient, power or torque is held against a baseline without the density "
         "of its air";
-  if (observations.of_no_cell && !observations.is_line() && is_of_air_or_of_a_cell_in_it(effect))
+  if (observations.of_no_cell && !observations.is_line() &&
+      (is_of_air(effect) || is_of_a_cell_in_the_air(effect)))
     result.reason =
         "nothing says that a cell read the response, or that the air is in it: it is a number without a "
         "unit, a "
         "time, a length or the like";
-  if (effect.name == "axial_wind" && observations.of_no_cell)
+  const bool bends = effect.name == "nonlinearity" || effect.name == "bidirectional";
+  if (is_of("power", observations) && (bends || is_of_a_cell_in_the_air(effect)))
+    result.reason = "a power is no force that a cell has read";
+  if (effect.name == "axial_wind" && (observations.of_no_cell || is_of("pressure", observations)))
     result.reason = "nothing says that the response is a rotor's, through which the wind would go";
   if (effect.name == "tip_mach" && observations.from_table) {
     if (observations.find(kDiameter) == nullptr) result.missing.emplace_back(kDiameter);
@@ -158,9 +176,11 @@ Testability testability(const Effect& effect, const Observations& observations) 
         "only forces, torques and what a cell reads of them go with the square of the speed: give the "
         "response "
         "its unit";
-  if (observations.coefficient && !is_made_c_t(observations) &&
-      (effect.name == "nonlinearity" || effect.name == "bidirectional"))
-    result.reason = "a coefficient is no force that a cell has read";
+  const bool no_force = observations.coefficient ? !is_made_c_t(observations)
+                                                 : observations.of_no_cell && !observations.is_line();
+  if (no_force && bends)
+    result.reason = fmt::format("a {} is no force that a cell has read",
+                                observations.coefficient ? "coefficient" : "number");
   if (effect.name == "zero_offset" && !shows_zero_offset(observations))
     result.reason =
         is_made_c_t(observations) && !observations.multiplicative
@@ -177,8 +197,11 @@ Testability testability(const Effect& effect, const Observations& observations) 
 std::vector<std::string> own_conditions(const Effect& effect, const Observations& observations) {
   const bool of_force_alone = effect.covariates.empty() && effect.scope != EffectScope::kPair &&
                               !effect.needs_previous && !effect.has_change_point();
-  if (!of_force_alone || observations.baseline_over.empty()) return effect.covariates;
-  return {observations.baseline_over};
+  if (!of_force_alone) return effect.covariates;
+  if (!observations.baseline_over.empty()) return {observations.baseline_over};
+  const bool of_rotors = !observations.from_table || observations.of_air;
+  if (of_rotors && observations.find("speed_rpm") != nullptr) return {"speed_rpm"};
+  return {};
 }
 
 std::vector<Term> known_terms(const Observations& observations) {

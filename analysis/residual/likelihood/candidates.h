@@ -16,8 +16,9 @@ struct Testability {
 };
 Testability testability(const Effect& effect, const Observations& observations);
 
-/// What an effect goes by: its covariates; with `linear:COLUMN` or `power:COLUMN` that column for a function
-/// of the force alone, because a bend there is as likely the law's as the cell's.
+/// What an effect goes by: its covariates; for a function of the force alone what the baseline's force goes
+/// by, because a bend there is as likely the law's as the cell's: the column of `linear:COLUMN` or
+/// `power:COLUMN`, or the measured speed of rotors.
 std::vector<std::string> own_conditions(const Effect& effect, const Observations& observations);
 
 /// What is known whatever the data say: of a campaign whose speeds were measured, that thrust goes with their

@@ -130,21 +130,30 @@ class CurvesToTry {
       return;
     for (const Place& place : places_)
       add(covariate, over,
-          is_ratio(observations_, covariate) ? CurveShape::kLogStraight : CurveShape::kStraight, 1, place);
-    const int most = places_on_range(covariate, rows_) / 3;
-    if (most >= 1)
-      for (const CurveShape bend : bends_over(observations_, covariate, rows_)) add(covariate, over, bend, 1);
-    // Where a whole wave finds no row its height is anything.
-    const double gap = most >= kBends[1] ? widest_gap(covariate, rows_) : 0;
+          is_ratio(observations_, covariate) ? CurveShape::kLogStraight : CurveShape::kStraight, 1, rotors_,
+          place);
+    for (const CurveShape bend : bends_over(observations_, covariate, rows_))
+      add(covariate, over, bend, 1, with_room(covariate, 1));
     for (const int count : kBends)
-      if (count <= most && gap * count <= 2) add(covariate, over, CurveShape::kWaves, count);
+      add(covariate, over, CurveShape::kWaves, count, with_room(covariate, count));
+  }
+
+  /// The rotors whose own values lie close enough for so many waves. Where a whole one finds no row its
+  /// height is anything.
+  std::vector<int> with_room(const Covariate& covariate, int waves) const {
+    std::vector<int> result;
+    for (const int rotor : rotors_)
+      if (3 * waves <= places_on_range(covariate, rows_, rotor) &&
+          (waves < kBends[1] || widest_gap(covariate, rows_, rotor) * waves <= 2))
+        result.push_back(rotor);
+    return result;
   }
 
   /// For all rotors alike and for each alone.
   void add(const Covariate& covariate, const Curve& over, CurveShape shape, int count,
-           const Place& place = {}) {
+           const std::vector<int>& rotors, const Place& place = {}) {
     const auto column_at = [&](int k, double x) { return curve_column(shape, k, x, over.low, over.high); };
-    for (const int rotor : rotors_) {
+    for (const int rotor : rotors) {
       Curve curve = over;
       curve.rotor = rotor;
       curve.shape = shape;
@@ -242,10 +251,10 @@ std::vector<Curve> smooth_forms(const Observations& observations, const Curve& c
     });
     return form;
   };
-  const int most = std::clamp(places_on_range(*covariate, rows) / 3, 2, kBends.back() + 2);
+  const int most = std::clamp(places_on_range(*covariate, rows, curve.rotor) / 3, 2, kBends.back() + 2);
   std::vector<Curve> forms;
   for (int count = 1; count <= (is_of_logarithm(curve.shape) ? 2 : most); ++count) {
-    if (widest_gap(*covariate, rows) * (count - 2) > 2) break;
+    if (widest_gap(*covariate, rows, curve.rotor) * (count - 2) > 2) break;
     forms.push_back(form_of(bend && count <= 2 ? curve.shape : CurveShape::kSmooth, count));
   }
   return forms;

@@ -82,10 +82,11 @@ class RunCovariance {
 
 /// Where whole groups are held out, a group's constant and slopes are fitted to every other run of it; the
 /// rest is scored, if there are as many runs as coefficients. `residual` came with NaN there because the
-/// model has no such group: `plain` is the same without any baseline. `covariance`: of what runs scatter.
+/// model has no such group: `plain` is the same without any baseline. `covariance`: of what runs scatter;
+/// `columns`: stacked, of amplitudes that have `of_amplitudes`.
 void own_baseline(const Observations& observations, const std::vector<int>& rows,
-                  const RunCovariance& covariance, const MatrixXd& plain, MatrixXd& residual,
-                  MatrixXd& variance) {
+                  const RunCovariance& covariance, const MatrixXd& plain, const Stacked& columns,
+                  const MatrixXd& of_amplitudes, MatrixXd& residual, MatrixXd& variance) {
   for (auto& [group, members] : places_of_each(observations.group, rows)) {
     std::erase_if(members, [&](Index r) { return !std::isnan(residual(r, 0)); });
     std::vector<Index> fitted, scored;
@@ -109,6 +110,11 @@ void own_baseline(const Observations& observations, const std::vector<int>& rows
       variance.row(scored[m]).setConstant(covariance({scored[m]}, {scored[m]})(0, 0) -
                                           2 * w.dot(shared.row(static_cast<Index>(m))) +
                                           w.dot(w * of_fitted));
+    }
+    for (Index mode = 0; mode < variance.cols() && columns.cols() > 0; ++mode) {
+      const auto own = columns.middleRows(mode * variance.rows(), variance.rows());
+      const MatrixXd left = own(scored, Eigen::all) - share * own(fitted, Eigen::all);
+      variance(scored, mode) += (left * of_amplitudes).cwiseProduct(left).rowwise().sum();
     }
   }
 }
@@ -174,8 +180,8 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     Stacked variance = (scatter.array().square() + kRatios[null.ratio[s]]).replicate(stratum.modes, 1);
     variance += model.baseline_variance(s, null.ratio[s], test_rows).replicate(stratum.modes, 1);
     variance *= sigma2;
+    const Stacked stacked = test.stack(s, items);
     if (!items.empty()) {
-      const Stacked stacked = test.stack(s, items);
       const Stacked x = stacked - model.baseline_prediction(s, null.ratio[s], fit.columns[s], test_rows);
       plain -= stacked * fit.amplitude;
       residual -= x * fit.amplitude;
@@ -186,7 +192,8 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     if (stratum.means() && (observations.groups_within_blocks || !observations.held_out.empty()))
       own_baseline(observations, test_rows,
                    RunCovariance(observations, test_rows, scatter, null.sigma[s], model.run_correlation(s)),
-                   Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes), errors, variances);
+                   Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes), stacked, fit.covariance,
+                   errors, variances);
     parts.push_back(whitened(observations, test_rows, errors, scatter, null.sigma[s], kRatios[null.ratio[s]],
                              model.run_correlation(s)));
     if (!stratum.means()) continue;
@@ -246,8 +253,11 @@ HeldOutErrors CrossValidation::all() const {
   for (const HeldOutErrors& fold : folds) {
     const Index before = result.error.rows();
     result.rows.insert(result.rows.end(), fold.rows.begin(), fold.rows.end());
-    result.error.conservativeResize(before + fold.error.rows(), fold.error.cols());
+    const Index rows = before + fold.error.rows();
+    result.error.conservativeResize(rows, fold.error.cols());
     result.error.bottomRows(fold.error.rows()) = fold.error;
+    result.expected_std.conservativeResize(rows, fold.error.cols());
+    result.expected_std.bottomRows(fold.error.rows()) = fold.expected_std;
   }
   return result;
 }
@@ -260,7 +270,10 @@ VectorXd CrossValidation::losses() const {
 }
 
 LossDifference compare(const CrossValidation& worse, const CrossValidation& better) {
-  const VectorXd difference = worse.losses() - better.losses();
+  VectorXd difference = worse.losses() - better.losses();
+  // Where one of them has too few runs for its coefficients, they are not held against the same runs.
+  for (std::size_t fold = 0; fold < worse.folds.size(); ++fold)
+    if (worse.folds[fold].count() != better.folds[fold].count()) difference(static_cast<Index>(fold)) = 0;
   const double n = static_cast<double>(difference.size());
   LossDifference result{.mean = difference.mean(), .total = difference.sum()};
   result.standard_error = std::sqrt((difference.array() - result.mean).square().sum() / (n * (n - 1)));

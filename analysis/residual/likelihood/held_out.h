@@ -52,14 +52,15 @@ struct CrossValidation {
   std::vector<HeldOutErrors> folds;
 
   double rmse() const;
-  HeldOutErrors all() const;       // rows and errors of all folds
+  HeldOutErrors all() const;       // rows, errors and what these are expected to be, of all folds
   Eigen::VectorXd losses() const;  // of the folds
 };
 CrossValidation cross_validate(const Observations& observations, const Components& y,
                                const std::vector<Components>& columns, const NullFit& null,
                                const std::vector<int>& rows);
 
-/// Mean difference of two models' losses over the folds, and its standard error: `worse` less `better`.
+/// Mean difference of two models' losses over the folds, and its standard error: `worse` less `better`. 0 of
+/// a fold in which the two do not score the same runs.
 struct LossDifference {
   double mean = 0, standard_error = 0;
 

@@ -14,9 +14,28 @@ using Eigen::MatrixXd;
 /// A value of few is told apart if as many blocks have it as a step needs on either side.
 constexpr std::size_t kBlocksPerLevel = 3, kMostLevels = 12;
 
+namespace {
+
+/// Of one rotor, or of all (−1).
+std::set<double> values_of(const Covariate& covariate, const std::vector<int>& rows, int rotor) {
+  std::set<double> values;
+  for (const int row : rows)
+    for (Index c = 0; c < covariate.value.cols(); ++c)
+      if (rotor < 0 || c == rotor || !covariate.per_channel()) values.insert(covariate.value(row, c));
+  return values;
+}
+
+/// Over runs and rotors, from the mean.
+Eigen::VectorXd deviations(const Covariate& covariate, Index channels) {
+  const MatrixXd all = covariate.value.replicate(1, channels / covariate.value.cols());
+  return all.reshaped().array() - all.mean();
+}
+
+}  // namespace
+
 double correlation(const Covariate& first, const Covariate& second) {
-  const Eigen::VectorXd u = first.value.col(0).array() - first.value.col(0).mean(),
-                        v = second.value.col(0).array() - second.value.col(0).mean();
+  const Index channels = std::max(first.value.cols(), second.value.cols());
+  const Eigen::VectorXd u = deviations(first, channels), v = deviations(second, channels);
   const double norms = u.norm() * v.norm();
   return norms > 0 ? u.dot(v) / norms : 0;
 }
@@ -70,10 +89,9 @@ double share_beside_cubics(const Observations& observations, const std::vector<i
   return whole.squaredNorm() > 0 ? left.squaredNorm() / whole.squaredNorm() : 0;
 }
 
-int places_on_range(const Covariate& covariate, const std::vector<int>& rows) {
+int places_on_range(const Covariate& covariate, const std::vector<int>& rows, int rotor) {
   constexpr double kApart = 0.01;
-  std::set<double> values;
-  for (const int row : rows) values.insert(covariate.value(row, 0));
+  const std::set<double> values = values_of(covariate, rows, rotor);
   const double range = *values.rbegin() - *values.begin();
   int count = 0;
   auto next = values.begin();
@@ -118,10 +136,8 @@ std::vector<double> levels_of(const Observations& observations, const Covariate&
   return levels;
 }
 
-double widest_gap(const Covariate& covariate, const std::vector<int>& rows) {
-  std::set<double> values;
-  for (const int row : rows)
-    for (Index c = 0; c < covariate.value.cols(); ++c) values.insert(covariate.value(row, c));
+double widest_gap(const Covariate& covariate, const std::vector<int>& rows, int rotor) {
+  const std::set<double> values = values_of(covariate, rows, rotor);
   double gap = 0;
   for (auto next = std::next(values.begin()); next != values.end(); ++next)
     gap = std::max(gap, *next - *std::prev(next));

@@ -28,9 +28,9 @@ bool can_be_followed(const Observations& observations, const Covariate& covariat
 double share_beside_cubics(const Observations& observations, const std::vector<int>& rows,
                            const std::vector<Eigen::VectorXd>& conditions, const Eigen::VectorXd& column);
 
-/// How many of the first channel's values in `rows` are at least a hundredth of the range apart: four speeds
-/// that scatter a little are four, and between them a wave has any height.
-int places_on_range(const Covariate& covariate, const std::vector<int>& rows);
+/// How many of the values that a rotor has in `rows` (−1: all of them) are at least a hundredth of the range
+/// apart: four speeds that scatter a little are four, and between them a wave has any height.
+int places_on_range(const Covariate& covariate, const std::vector<int>& rows, int rotor);
 
 /// How many values `rows` have; of the first channel.
 int different_values(const Covariate& covariate, const std::vector<int>& rows);
@@ -39,7 +39,7 @@ int different_values(const Covariate& covariate, const std::vector<int>& rows);
 std::vector<double> levels_of(const Observations& observations, const Covariate& covariate,
                               const std::vector<int>& rows);
 
-/// The widest part of the covariate's range without a row in it, over that range.
-double widest_gap(const Covariate& covariate, const std::vector<int>& rows);
+/// The widest part of a rotor's range of values (−1: that of all) without one in it, over that range.
+double widest_gap(const Covariate& covariate, const std::vector<int>& rows, int rotor);
 
 }  // namespace tunnelrig

@@ -1,6 +1,8 @@
 #include "analysis/residual/observations/observations.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -13,6 +15,20 @@ std::vector<T> picked(const std::vector<T>& from, const std::vector<int>& rows) 
   if (from.empty()) return result;
   for (const int row : rows) result.push_back(from[static_cast<std::size_t>(row)]);
   return result;
+}
+
+/// Run numbers among `kept`, for those at which zeros were taken: of a run that is left out, the next of its
+/// block, or the last.
+Eigen::MatrixXd renumbered(const Eigen::MatrixXd& run_numbers, const std::vector<int>& kept,
+                           const std::vector<int>& block) {
+  const auto block_of = [&](int row) { return block[static_cast<std::size_t>(row)]; };
+  return run_numbers.unaryExpr([&](double number) {
+    if (std::isnan(number)) return number;
+    auto next = std::ranges::lower_bound(kept, number);
+    const bool beyond = next == kept.end() || block_of(*next) != block_of(static_cast<int>(number));
+    if (beyond && next != kept.begin()) --next;
+    return static_cast<double>(next - kept.begin());
+  });
 }
 
 /// Numbers without gaps, in the same order, and the names that they have.
@@ -97,6 +113,18 @@ RunScatter RunScatter::subset(const std::vector<int>& kept) const {
   return part;
 }
 
+Observations Observations::without_responses_but(const std::vector<int>& open) const {
+  Observations result = *this;
+  const auto hide = [&](Eigen::MatrixXd& responses, const Eigen::MatrixXd& all) {
+    responses.setConstant(std::numeric_limits<double>::quiet_NaN());
+    responses(open, Eigen::all) = all(open, Eigen::all);
+  };
+  hide(result.value, value);
+  hide(result.y, y);
+  for (std::size_t j = 0; j < shape.size(); ++j) hide(result.shape[j], shape[j]);
+  return result;
+}
+
 Observations Observations::subset(const std::vector<int>& kept) const {
   Observations part = *this;
   for (Eigen::MatrixXd* matrix : {&part.value, &part.known, &part.y, &part.slopes})
@@ -109,8 +137,9 @@ Observations Observations::subset(const std::vector<int>& kept) const {
   part.duration_s = Eigen::VectorXd(duration_s(kept));
   for (Covariate& covariate : part.covariates) {
     covariate.value = Eigen::MatrixXd(covariate.value(kept, Eigen::all));
-    if (covariate.at_zero.size() > 0)
-      covariate.at_zero = Eigen::MatrixXd(covariate.at_zero(kept, Eigen::all));
+    if (covariate.at_zero.size() == 0) continue;
+    covariate.at_zero = Eigen::MatrixXd(covariate.at_zero(kept, Eigen::all));
+    if (covariate.name == "run_order") covariate.at_zero = renumbered(covariate.at_zero, kept, block);
   }
   part.name = picked(name, kept);
   part.group = picked(group, kept);

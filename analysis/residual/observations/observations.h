@@ -6,6 +6,7 @@
 #include "datasets/observations.h"
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
@@ -183,6 +184,10 @@ struct Observations {
 
   /// The same of some rows only. Groups and blocks without a row are gone; the others keep their order.
   Observations subset(const std::vector<int>& kept) const;
+
+  /// The same with the responses of these rows only, NaN in all others: what must not be seen of sealed rows.
+  Observations without_responses_but(const std::vector<int>& rows) const;
+  bool has_response(Eigen::Index row) const { return !std::isnan(y(row, 0)); }
 };
 
 struct ObservationChoice {

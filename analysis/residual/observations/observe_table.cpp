@@ -304,7 +304,8 @@ void set_baseline(const TableSource& source, const ObservationChoice& choice, Ob
   if (column == result.response)
     throw InputError(fmt::format("--baseline {}: this is the response itself", result.baseline));
   const std::string_view over = unit_from_name(described(source.table.schema, column).unit).quantity;
-  result.line_of_cell = kind == "linear" && (!result.of_air || over == "force" || over == "torque");
+  const bool of_load = over == "force" || over == "torque" || over == "pressure";
+  result.line_of_cell = kind == "linear" && (of_load || (!result.of_air && !result.of_no_cell));
   if (kind == "linear") set_other_axes(source.table.schema, column, result);
 }
 

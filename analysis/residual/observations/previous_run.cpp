@@ -26,12 +26,14 @@ bool in_one_group(const Observations& observations, Index row, int other) {
 }  // namespace
 
 MatrixXd variance_of_constants(const Observations& observations, const MatrixXd& predicted) {
-  const double free = static_cast<double>(observations.rows() - observations.groups());
-  const Eigen::RowVectorXd variance =
-      (observations.y - scaled(observations, predicted)).colwise().squaredNorm() / std::max(free, 1.0);
+  const MatrixXd left = observations.y - scaled(observations, predicted);
   VectorXd count = VectorXd::Zero(observations.groups());
-  for (const int group : observations.group) count(group) += 1;
-  return count(observations.group).cwiseInverse() * variance;
+  for (Index row = 0; row < observations.rows(); ++row)
+    if (observations.has_response(row)) count(observations.group[static_cast<std::size_t>(row)]) += 1;
+  const double free = count.sum() - static_cast<double>((count.array() > 0).count());
+  const Eigen::RowVectorXd variance =
+      left.array().isNaN().select(0, left).colwise().squaredNorm() / std::max(free, 1.0);
+  return count(observations.group).cwiseMax(1).cwiseInverse() * variance;
 }
 
 PreviousRun::PreviousRun(const Observations& observations, const MatrixXd& predicted)

@@ -8,13 +8,14 @@ namespace tunnelrig {
 
 Search::Search(const Observations& observations, const std::vector<int>& rows,
                const std::vector<const Effect*>& effects, const SearchSettings& settings)
-    : given_(observations),
-      observations_(observations),
+    : whole_(observations),
+      given_(observations.without_responses_but(rows)),
+      observations_(given_),
       rows_(rows),
       effects_(effects),
       settings_(settings),
-      curves_(curves_to_try(observations, rows)),
-      y_(response_components(observations)) {}
+      curves_(curves_to_try(observations_, rows)),
+      y_(response_components(observations_)) {}
 
 Attribution Search::run() {
   begin();
@@ -34,6 +35,9 @@ Attribution Search::run() {
   result_.session_unknown = session_scatter_is_large();
   result_.final = fit_;
   result_.observations = std::move(observations_);
+  result_.observations.value = whole_.value;
+  result_.observations.y = whole_.y;
+  result_.observations.shape = whole_.shape;
   return std::move(result_);
 }
 

@@ -225,7 +225,8 @@ class Search {
   void name_newest_curve(const JointFit& without);
   CrossValidation unseen(const JointFit& fit, const NullFit& variances) const;
 
-  const Observations& given_;
+  const Observations& whole_;
+  const Observations given_;   // nothing is searched, or judged, by a response outside of `rows_`
   Observations observations_;  // a group's own amplitudes become a part of its baseline
   const std::vector<int>& rows_;
   const std::vector<const Effect*>& effects_;

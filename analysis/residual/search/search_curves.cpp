@@ -38,7 +38,9 @@ Search::CurveScan Search::scan_curves() const {
   for (const Curve& each : curves_) {
     if (is_described(each)) continue;
     const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
-      return each.everywhere() && a.term.rotor == each.rotor && is_over(each, a.term.effect->covariates);
+      // What goes with the square of the speed leaves the straight part of a curve over it to be found.
+      return !a.term.effect->theory_only && each.everywhere() && a.term.rotor == each.rotor &&
+             is_over(each, a.term.effect->covariates);
     });
     // What is straight over few values has a name then, and the bends ask for the rest.
     if (named && each.shape == CurveShape::kLevels) continue;
@@ -104,7 +106,7 @@ void Search::smooth_curves(std::size_t first) {
     for (const Curve& form : forms) candidates.push_back(as_candidate(form));
     const auto fits =
         CandidateScan(*mixed_, without.linear.columns, candidates).fit(difference(y_, without.linear.offset));
-    const double n = places_on_range(*observations_.find(forms[0].covariate), rows_);
+    const double n = places_on_range(*observations_.find(forms[0].covariate), rows_, forms[0].rotor);
     const auto criterion = [&](std::size_t i) {  // Hurvich & Tsai 1989
       const auto k = static_cast<double>(i + 1);
       return 2 * k * n / std::max(n - k - 2, 1.0) - 2 * fits[i].likelihood_ratio;

@@ -44,7 +44,7 @@ void Search::swap_weaker() {
       continue;
     NullMaxima maxima = maxima_of(without, scan, ++salt_);
     if (const double p = maxima.p(scan.fits[best].evidence); p <= settings_.alpha)
-      put_in_place(t, without, tried, p);
+      put_in_place(t--, without, tried, p);
     else
       drop(t--, without);  // with the newest in, neither is beyond chance
   }
