@@ -2,8 +2,11 @@
 
 #include "analysis/reduction.h"
 #include "analysis/upper_median.h"
+#include "datasets/first_few.h"
 
 #include <cmath>
+
+#include <fmt/format.h>
 
 namespace tunnelrig {
 namespace {
@@ -67,6 +70,21 @@ MisreadRuns misread_runs(const CampaignData& data) {
     if (broken) result.broken_off.push_back(data.runs[r].run);
   }
   return result;
+}
+
+std::vector<std::string> in_words(const MisreadRuns& runs) {
+  constexpr std::size_t kNamed = 6;
+  std::vector<std::string> sentences;
+  if (!runs.loaded_tares.empty())
+    sentences.push_back(
+        fmt::format("{}: tares that are loaded like thrust runs, and shift the zeros of their sessions "
+                    "(`tunnelrig doctor`)",
+                    first_few(runs.loaded_tares, kNamed)));
+  if (!runs.broken_off.empty())
+    sentences.push_back(
+        fmt::format("{}: not one state, their means are known to no better than 5 % (`tunnelrig doctor`)",
+                    first_few(runs.broken_off, kNamed)));
+  return sentences;
 }
 
 }  // namespace tunnelrig

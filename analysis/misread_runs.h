@@ -19,4 +19,7 @@ struct MisreadRuns {
 /// and turbulence leave a tenth of it.
 MisreadRuns misread_runs(const CampaignData& data);
 
+/// A sentence for either kind; none where there is none.
+std::vector<std::string> in_words(const MisreadRuns& runs);
+
 }  // namespace tunnelrig

@@ -106,23 +106,33 @@ ProgressBar::~ProgressBar() {
   if (drawn_ && error_is_terminal()) tell("\r\x1b[K");
 }
 
-void ProgressBar::show(double done, double total, const std::string& note) {
+bool ProgressBar::is_time_to_draw() {
   const auto now = Clock::now();
-  const bool terminal = error_is_terminal();
-  if (now - started_ < kQuiet ||
-      now - last_ < (terminal ? Clock::duration(kRedraw) : Clock::duration(kLineInterval)))
-    return;
+  const Clock::duration interval = error_is_terminal() ? Clock::duration(kRedraw) : kLineInterval;
+  if (now - started_ < kQuiet || now - last_ < interval) return false;
   last_ = now;
   drawn_ = true;
+  return true;
+}
+
+void ProgressBar::show(double done, double total, const std::string& note) {
+  if (!is_time_to_draw()) return;
   const double fraction = total > 0 ? std::clamp(done / total, 0.0, 1.0) : 0;
-  const double elapsed_s = std::chrono::duration<double>(now - started_).count();
+  const double elapsed_s = std::chrono::duration<double>(last_ - started_).count();
   const std::string left =
       fraction > 0.01 ? duration_text(elapsed_s / fraction * (1 - fraction)) + " left" : "";
-  if (terminal) {
+  if (error_is_terminal()) {
     tell(fmt::format("\r\x1b[K{} {} {:3.0f} %  {}  {}", what_, bar_of(fraction), 100 * fraction, left, note));
   } else {
     tell(fmt::format("{} {:.0f} %  {}  {}\n", what_, 100 * fraction, left, note));
   }
+}
+
+void ProgressBar::show(const std::string& note) {
+  if (!is_time_to_draw()) return;
+  const double elapsed_s = std::chrono::duration<double>(last_ - started_).count();
+  const std::string text = fmt::format("{} for {}  {}", what_, duration_text(elapsed_s), note);
+  tell(error_is_terminal() ? "\r\x1b[K" + text : text + "\n");
 }
 
 std::string duration_text(double seconds) {

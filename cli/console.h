@@ -54,9 +54,13 @@ class ProgressBar {
 
   /// `note` stands behind the bar.
   void show(double done, double total, const std::string& note = {});
+  /// Of work of which nobody knows how much there is.
+  void show(const std::string& note);
 
  private:
   using Clock = std::chrono::steady_clock;
+
+  bool is_time_to_draw();
 
   std::string what_;
   Clock::time_point started_;

@@ -108,11 +108,7 @@ int run_explain(ExplainOptions options) {
         "--alpha {} needs --simulations {:.0f} at least: of {:.0f} none can be rarer than 1 in {:.0f}",
         options.search.alpha, std::ceil(1 / options.search.alpha) - 1, most, most + 1));
   ProgressBar progress("explaining");
-  double step = 0;
-  options.search.progress = [&](const std::string& what) {
-    step += 1;
-    progress.show(step, step + 3, what);
-  };
+  options.search.progress = [&](const std::string& what) { progress.show(what); };
   const Explanation explanation = explain(observations, effects.all, options.search);
   for (const std::string& warning : explanation.warnings) warn(warning);
   const std::string json = explanation_json(explanation);

@@ -6,7 +6,6 @@
 #include "cli/console.h"
 #include "cli/verb.h"
 #include "datasets/error.h"
-#include "datasets/first_few.h"
 #include "datasets/statistics_store.h"
 
 #include <algorithm>
@@ -118,17 +117,10 @@ bool warn_of_left_out(const CampaignData& data, const Reduction& reduction) {
     warn(fmt::format("{} runs have no tare in their session; their zero is the calibration's, extrapolated",
                      untared));
   }
-  constexpr std::size_t kNamed = 6;
-  const MisreadRuns misread = misread_runs(data);
-  if (!misread.loaded_tares.empty())
-    warn(
-        fmt::format("{}: tares that are loaded like thrust runs, and shift the zeros of their sessions "
-                    "(`tunnelrig doctor`)",
-                    first_few(misread.loaded_tares, kNamed)));
-  if (!misread.broken_off.empty())
-    warn(fmt::format("{}: not one state, their means are known to no better than 5 % (`tunnelrig doctor`)",
-                     first_few(misread.broken_off, kNamed)));
-  problem |= !misread.loaded_tares.empty() || !misread.broken_off.empty();
+  for (const std::string& misread : in_words(misread_runs(data))) {
+    warn(misread);
+    problem = true;
+  }
   problem |= warn_of(implausible_thrust(data, reduction));
   return problem;
 }

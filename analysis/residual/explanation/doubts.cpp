@@ -65,7 +65,8 @@ void warn_of_doubts(Explanation& explanation) {
         fmt::format("on the sealed blocks the error with all that was found is {:.2g} times the noise floor: "
                     "something else varies there",
                     explanation.sealed.all / explanation.noise_floor));
-  else if (worse && explanation.sealed.against_adopted)
+  else if (worse && (explanation.sealed.against_adopted ||
+                     is_worse(explanation.after.held_out_rmse, explanation.before.held_out_rmse)))
     explanation.warnings.emplace_back(
         "on the sealed blocks the error is larger with what was adopted than without: doubt it");
   else if (worse)

@@ -111,9 +111,6 @@ std::string refutation(const AdoptedEffect& adopted, const Observations& observa
   return nothing ? fmt::format("the 95 % interval of its {} holds 0", amplitude.name) : "";
 }
 
-/// Of two errors of the sealed blocks: by more than chance may do.
-bool worse(double error, double than) { return error > 1.1 * than; }
-
 /// What the opened seal refutes: single names, or all of them, since which is wrong is not known, and another
 /// for the same would be chosen by the seal.
 struct Refuted {
@@ -126,13 +123,13 @@ struct Refuted {
 };
 
 bool curves_do_better(const Explanation& explanation) {
-  return worse(explanation.sealed.all, explanation.sealed.curves) && explanation.sealed.against_names;
+  return is_worse(explanation.sealed.all, explanation.sealed.curves) && explanation.sealed.against_names;
 }
 
 /// Better than the names, whether what else was found is in or not.
 bool baseline_does_better(const Explanation& explanation) {
-  return worse(explanation.sealed.all, explanation.before.held_out_rmse) &&
-         worse(explanation.sealed.names, explanation.before.held_out_rmse) &&
+  return is_worse(explanation.sealed.all, explanation.before.held_out_rmse) &&
+         is_worse(explanation.sealed.names, explanation.before.held_out_rmse) &&
          explanation.sealed.against_adopted;
 }
 
@@ -207,12 +204,12 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
     without.untestable = explanation.untestable;
     // What bends away from a formula, or is no step, is structure, and predicts as such.
     const double without_them = found.structure ? without.sealed.all : without.sealed.names;
-    const bool stay = !found.at_bound && worse(explanation.sealed.curves, explanation.sealed.all) &&
-                      worse(without_them, explanation.sealed.all);
+    const bool stay = !found.at_bound && is_worse(explanation.sealed.curves, explanation.sealed.all) &&
+                      is_worse(without_them, explanation.sealed.all);
     if (stay) {
       const auto as_well = std::ranges::find_if(before, [&](const Found& earlier) {
         return !earlier.refuted.all && !earlier.refuted.at_bound &&
-               !worse(earlier.explanation.sealed.all, explanation.sealed.all);
+               !is_worse(earlier.explanation.sealed.all, explanation.sealed.all);
       });
       if (as_well == before.end()) {
         say(found, true, said);

@@ -53,6 +53,9 @@ void warn_of_scatter(const Observations& observations, Explanation& explanation)
 /// Candidates that would be named, were it not for their physical bounds.
 void warn_of_bounds(const Observations& observations, const Attribution& found, Explanation& explanation);
 
+/// Of two errors of the sealed blocks: by more than chance may do.
+inline bool is_worse(double error, double than) { return error > 1.1 * than; }
+
 /// What the opened seal and the intervals say against what was adopted.
 void warn_of_doubts(Explanation& explanation);
 

@@ -27,13 +27,14 @@ double scale_of(const Observations& observations) {
 }
 
 /// Whether the sealed runs speak against a model: they are predicted clearly worse than without it, and worse
-/// than it expects of itself. Where an effect does little in them (they lie at its reference) it is chance
-/// whether the error grows.
+/// than either expects of itself (gross runs among the open ones are taken for scatter). Where an effect does
+/// little in them (they lie at its reference) it is chance whether the error grows.
 bool speak_against(const HeldOutErrors& with, const HeldOutErrors& without) {
   constexpr double kClearly = 2;  // standard errors, by runs
   const MatrixXd squares = with.error.array().square() - without.error.array().square();
   const Eigen::VectorXd of_runs = squares.array().isNaN().select(0, squares).rowwise().sum();
-  return of_runs.sum() > kClearly * of_runs.norm() && rms(with.error) > rms(with.expected_std);
+  return of_runs.sum() > kClearly * of_runs.norm() &&
+         rms(with.error) > std::min(rms(with.expected_std), rms(without.expected_std));
 }
 
 /// Whether errors are far larger than runs of that scatter make them, by their blocks: each counts as one.

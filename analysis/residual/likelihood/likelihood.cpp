@@ -40,11 +40,16 @@ struct CandidateScan::Impl {
         adopted(columns.adopted()),
         all_adopted(static_cast<Index>(adopted_columns.size())),
         strata(m, columns, widths) {
+    check_width(0);
     for (std::size_t i = 0; i < candidates.size(); ++i) {
-      if (all_adopted + widths[i] > kMostColumns)
-        throw std::length_error(fmt::format("a model of more than {} columns", kMostColumns));
+      check_width(widths[i]);
       table_of.push_back(table_for(i));
     }
+  }
+
+  void check_width(Index beside_adopted) const {
+    if (all_adopted + beside_adopted > kMostColumns)
+      throw std::length_error(fmt::format("a model of more than {} columns", kMostColumns));
   }
 
   static std::vector<Index> widths_of(const std::vector<Candidate>& all) {

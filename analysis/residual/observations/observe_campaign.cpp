@@ -1,4 +1,5 @@
 #include "analysis/conventions.h"
+#include "analysis/misread_runs.h"
 #include "analysis/reduction.h"
 #include "analysis/residual/observations/campaign_conditions.h"
 #include "analysis/spectrum.h"
@@ -364,6 +365,7 @@ Observations observe_campaign(const CampaignData& data, const ObservationChoice&
   if (!(result.value.maxCoeff() > result.value.minCoeff()))
     throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain",
                                  result.response));
+  for (std::string& misread : in_words(misread_runs(data))) result.left_out.push_back(std::move(misread));
   return result;
 }
 

@@ -172,6 +172,54 @@ TEST_P(HeldOut, ExpectedScatterOfAGroupsOwnBaselineKnowsItsNeighbours) {
   EXPECT_NEAR(of_table.mean(), 1, 4 * spread / kTables);
 }
 
+/// And its errors have those of the amplitudes, of which the group's own constant takes up none that vary in
+/// it.
+TEST_P(HeldOut, ExpectedScatterOfAGroupsOwnBaselineHasTheAmplitudes) {
+  std::mt19937_64 random(test::seed() + 9);
+  constexpr int kTables = 300;
+  VectorXd of_table(kTables);  // mean square of error over expected
+  for (int i = 0; i < kTables; ++i) {
+    Observations o = test::simulate(
+        {.runs_of_block = std::vector<int>(6, 6), .groups = 1, .channels = GetParam(), .session_ratio = 0},
+        random);
+    o.group = o.block;
+    o.group_name = o.block_name;
+    o.groups_within_blocks = true;
+    const Split split = split_blocks(o);
+    MatrixXd column = normal(o.rows(), GetParam(), random);
+    column(split.test, Eigen::all) *= 5;  // far beyond what the fit has seen
+    const HeldOutErrors errors =
+        predict_held_out(o, {o.y}, {{column}}, known_variances(o, 0.002, 0), split.fit, split.test);
+    double of_this = 0;
+    for (Index k = 0; k < errors.error.size(); ++k)
+      if (const double error = errors.error.data()[k]; !std::isnan(error))
+        of_this += std::pow(error / errors.expected_std.data()[k], 2);
+    of_table(i) = of_this / static_cast<double>(errors.count());
+  }
+  const double spread = (of_table.array() - of_table.mean()).matrix().norm();
+  EXPECT_NEAR(of_table.mean(), 1, 4 * spread / kTables);
+}
+
+/// Runs that one of two models has no errors of are no runs that it predicts without error.
+TEST_P(HeldOut, ModelsAreComparedByRunsThatBothPredict) {
+  std::mt19937_64 random(test::seed() + 10);
+  Observations o = test::simulate(
+      {.runs_of_block = std::vector<int>(6, 4), .groups = 1, .channels = GetParam(), .session_ratio = 0},
+      random);
+  o.group = o.block;
+  o.group_name = o.block_name;
+  o.groups_within_blocks = true;
+  const auto left_out_errors = [&](const Observations& model) {
+    return cross_validate(model, {model.y}, {}, known_variances(model, 0.002, 0), model.all_rows());
+  };
+  Observations wide = o;  // as many coefficients of each group as it has runs
+  wide.slopes = normal(o.rows(), 3, random);
+  ASSERT_EQ(left_out_errors(wide).all().count(), 0);
+  const LossDifference gain = compare(left_out_errors(o), left_out_errors(wide));
+  EXPECT_EQ(gain.mean, 0);
+  EXPECT_FALSE(gain.told_apart());
+}
+
 TEST_P(HeldOut, GroupsThatOnlyTheHeldOutPartHasAreNotScored) {
   std::mt19937_64 random(test::seed() + 3);
   Observations o = test::simulate({.channels = GetParam()}, random);

@@ -3,6 +3,7 @@
 #include "analysis/residual/tables.h"
 #include "support/message_of.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -54,6 +55,35 @@ TEST_F(TablesTest, OnlyForcesGoWithTheSquareOfTheSpeed) {
     EXPECT_THAT(reason(unit, "rotor_speed"), HasSubstr("go with the square")) << unit;
   EXPECT_EQ(reason("N", "supply_voltage"), "supply_voltage_V is the same in every row")
       << "nor when another effect has made the forces vary";
+}
+
+/// A number over another number is read by no cell: its constant is a part of what effects act on.
+TEST_F(TablesTest, AStraightBaselineIsACellsLineWhereACellIsLoaded) {
+  std::string csv = "x,y\n";
+  for (int r = 0; r < 40; ++r) csv += fmt::format("{},{}\n", 0.1 + 0.01 * r, 1 + even(random));
+  const auto is_line = [&](const char* of_x, const char* of_y) {
+    return observed(csv,
+                    fmt::format("[response]\ncolumn = \"y\"\nunit = \"{}\"\n"
+                                "[[covariates]]\ncolumn = \"x\"\nunit = \"{}\"\n",
+                                of_y, of_x),
+                    "linear:x")
+        .is_line();
+  };
+  for (const char* of_y : {"1", "mV/V", "counts", "N"}) EXPECT_TRUE(is_line("N", of_y)) << of_y;
+  EXPECT_TRUE(is_line("Pa", "V"));
+  EXPECT_FALSE(is_line("1", "1")) << "C_P over J";
+  EXPECT_FALSE(is_line("rpm", "W"));
+}
+
+/// Over the few speeds of one setting an offset of any size would do.
+TEST_F(TablesTest, AnOffsetIsNoLargerThanWhatWasRead) {
+  const Observations o = thrusts(1);
+  const TableEffects effects(o, test::every_effect());
+  const auto offset =
+      std::ranges::find_if(effects.all, [](const Effect* effect) { return effect->name == "zero_offset"; });
+  ASSERT_NE(offset, effects.all.end());
+  EXPECT_EQ((*offset)->parameters[0].upper, o.value.maxCoeff());
+  EXPECT_EQ((*offset)->parameters[0].lower, -o.value.maxCoeff());
 }
 
 /// A power follows the air, a cell's counts its temperature; of a number without a unit neither is known.
