@@ -67,17 +67,19 @@ double tic_step_m(const Json& walls, double plot_mm) {
 
 Figure paths_figure(const Json& flight, const std::string& name, double width_mm) {
   const std::size_t shown = std::min(flight["controllers"].size(), kMostPaths);
-  constexpr double kLeft_mm = 15, kRight_mm = 2, kKey_mm = 8.5, kStrip_mm = 22, kLabel_mm = 10, kGap_mm = 2.5,
+  constexpr double kLeft_mm = 15, kRight_mm = 2, kStrip_mm = 22, kLabel_mm = 10, kGap_mm = 2.5,
                    kTitle_mm = 12;
+  const int across = width_mm < 75 ? 2 : 3;  // names have as many letters in a narrow figure
+  const double key_mm = across == 3 ? 8.5 : 12;
   const double path_mm = std::min(0.72 * width_mm, 110.0);
-  const Sheet sheet{width_mm, kKey_mm + path_mm + kLabel_mm + 2 * kStrip_mm + kGap_mm + kLabel_mm};
-  double top = sheet.height_mm - kKey_mm;
+  const Sheet sheet{width_mm, key_mm + path_mm + kLabel_mm + 2 * kStrip_mm + kGap_mm + kLabel_mm};
+  double top = sheet.height_mm - key_mm;
   std::string script = look() + blocks_of(flight, shown) + "set multiplot\n";
   script += sheet.axes({kLeft_mm, width_mm - kRight_mm, top - path_mm, top}, "y [m]", "z above the floor [m]",
                        kTitle_mm);
   std::vector<LegendEntry> entries{{"tunnel", "#333333", 0, 1, 1.6}, {"reference", "#000000", 0, 1, 0.5}};
   for (std::size_t i = 0; i < shown; ++i) entries.push_back(look_of_controller(flight, i));
-  script += legend(sheet, entries, sheet.height_mm - 2.2, 3, kLeft_mm);
+  script += legend(sheet, entries, sheet.height_mm - 2.2, across, kLeft_mm);
   const double step_m = tic_step_m(flight["walls"], std::min(path_mm, width_mm - kLeft_mm - kRight_mm));
   script += fmt::format("set xtics {0:g}\nset ytics {0:g}\n", step_m);
   script +=
