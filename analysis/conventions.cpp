@@ -3,6 +3,7 @@
 #include "datasets/error.h"
 
 #include <array>
+#include <cmath>
 #include <numbers>
 
 namespace tunnelrig {
@@ -40,6 +41,14 @@ std::string_view name_of(Convention convention) { return kNames[static_cast<std:
 
 double convert_coefficient(double value, Convention from, Convention to, const Rig& rig) {
   return value / per_thesis(from, rig) * per_thesis(to, rig);
+}
+
+std::string area_in_words(const Rig& rig) {
+  const double disc = std::numbers::pi * rig.propeller_radius_m * rig.propeller_radius_m;
+  constexpr double kAlike = 1e-3;
+  return std::abs(rig.rotor_area_m2 / disc - 1) <= kAlike
+             ? "one propeller disc"
+             : fmt::format("an area of {:.4g} m²", rig.rotor_area_m2);
 }
 
 double angular_speed_rad_s(double speed_rpm) { return speed_rpm * std::numbers::pi / 30; }

@@ -3,6 +3,7 @@
 
 #include "datasets/campaign.h"
 
+#include <string>
 #include <string_view>
 
 namespace tunnelrig {
@@ -20,6 +21,10 @@ std::string_view name_of(Convention convention);
 /// Converts a coefficient of the whole rig between conventions. Where a convention is per rotor, it is the
 /// mean of the rotors.
 double convert_coefficient(double value, Convention from, Convention to, const Rig& rig);
+
+/// A of the thesis's coefficient, for captions: "one propeller disc" where it is that to 0.1 %, as areas are
+/// written, else "an area of 0.0365 m²".
+std::string area_in_words(const Rig& rig);
 
 /// ½ ρ Ω² R² A, what a thrust is divided by for the thesis's coefficient, N.
 double thesis_reference_thrust_N(double density_kg_m3, double speed_rpm, const Rig& rig);

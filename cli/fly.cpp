@@ -25,6 +25,7 @@ struct FlyOptions {
   std::uint64_t seed = 1;
   double lidar_sigma_mm = 10;
   HiddenTruth hidden;
+  bool weak_rotor_named = false;
 };
 
 struct NamedMap {
@@ -61,11 +62,15 @@ std::vector<PlaceAndPath> programme_of(const FlyOptions& options) {
           {"2.4", "circle"}, {"1.5", "circle"},   {"railway", "waypoints"}};
 }
 
-/// That a result has somewhere to go, before it takes hours.
-void check_place(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  if (path.empty() || folder.empty() || std::filesystem::is_directory(folder)) return;
-  throw InputError::in(path, "cannot be written: there is no folder {}", folder.string());
+/// That the results have somewhere to go, before they take hours.
+void check_places(const FlyOptions& options) {
+  check_distinct({{"--map", options.map},
+                  {"--gains", options.gains},
+                  {"--json", options.json},
+                  {"--out", options.out},
+                  {"--tune", options.tune}});
+  for (const std::string& path : {options.json, options.tune})
+    if (!path.empty()) check_can_be_written(path);
 }
 
 /// Everything that can be refused, before anything is flown or printed.
@@ -186,10 +191,12 @@ int run_fly(const FlyOptions& given) {
   const Processes processes;
   const FlyOptions options = processes.rank() > 0 ? quiet_options(given) : given;
   options.hidden.validate();
+  if (options.hidden.motor_loss > 0 && !options.weak_rotor_named)
+    warn(fmt::format("--motor-loss without --weak-rotor: it is rotor {} that lost thrust",
+                     options.hidden.weak_rotor));
   if (options.position != "lidar" && options.position != "lidar-thesis" && options.position != "given")
     throw InputError(fmt::format("--position {}: must be lidar, lidar-thesis or given", options.position));
-  check_place(options.json);
-  check_place(options.tune);
+  check_places(options);
   if (!options.tune.empty()) return tune_all(options);
   const NamedMap map = map_of(options);
   const GainTable gains =
@@ -267,9 +274,13 @@ void add_fly(CLI::App& app, Work& work) {
                    "Undeclared: gusts along the tunnel, standard deviation");
   verb->add_option("--motor-loss", options->hidden.motor_loss,
                    "Undeclared: share of its thrust that a rotor lost");
-  verb->add_option("--weak-rotor", options->hidden.weak_rotor,
-                   "Which rotor that is, 1 to 4, numbered as the rig's");
-  verb->callback([options, &work] { work = [options] { return run_fly(*options); }; });
+  const CLI::Option* weak = verb->add_option("--weak-rotor", options->hidden.weak_rotor,
+                                             "Which rotor that is, 1 to 4, numbered as the rig's")
+                                ->capture_default_str();
+  verb->callback([options, weak, &work] {
+    options->weak_rotor_named = weak->count() > 0;
+    work = [options] { return run_fly(*options); };
+  });
 }
 
 }  // namespace tunnelrig::cli

@@ -173,7 +173,7 @@ void print_flown(const FlownScenario& flown) {
   double outside_s = 0;
   for (const Comparison& c : flown.controllers) outside_s = std::max(outside_s, c.clamped_s);
   if (outside_s > 0)
-    fmt::print("Up to {:.2f} s of a run were outside the map, where its border's values hold.\n", outside_s);
+    fmt::print("Up to {:.3g} s of a run were outside the map, where its border's values hold.\n", outside_s);
   fmt::print("\n");
 }
 

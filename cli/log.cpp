@@ -48,7 +48,7 @@ bool ask_operator(Logging& logging, const PlannedRun& planned, const PlannedRun*
 int run_plan(const LogOptions& options) {
   if (!options.location.empty() || !options.session.empty())
     throw InputError("--plan says where and when; --location and --session are for one run without it");
-  const std::vector<PlannedRun> plan = parse_plan(read_csv(options.plan));
+  const std::vector<PlannedRun> plan = read_plan(options.plan);
   Logging logging(options);
   const std::vector<PlannedRun> left = runs_left(logging.file(), plan);
   fmt::print("{}: {} of {} runs to record\n", options.plan, left.size(), plan.size());
@@ -65,13 +65,18 @@ int run_plan(const LogOptions& options) {
 int run_one(const LogOptions& options) {
   if (options.location.empty() || options.session.empty())
     throw InputError("log: --location and --session are required (or --plan FILE)");
-  Logging logging(options);
-  return logging.record({.session = options.session,
+  const PlannedRun asked{.session = options.session,
                          .kind = options.kind == "tare" ? RunKind::kTare : RunKind::kThrust,
                          .location = options.location,
                          .repeat = options.repeat,
-                         .duration_s = options.duration_s},
-                        "");
+                         .duration_s = options.duration_s};
+  Logging logging(options);
+  if (runs_left(logging.file(), {asked}).empty())
+    warn(fmt::format(
+        "{} holds a complete {} run of session {} at {}, repeat {}, already; both are kept, and count "
+        "as two repeats (--repeat numbers them)",
+        options.db, options.kind, asked.session, asked.location, asked.repeat));
+  return logging.record(asked, "");
 }
 
 int run_log(const LogOptions& options) {
@@ -135,7 +140,7 @@ void add_log(CLI::App& app, Work& work) {
   verb->add_option("--motor-s", options->motor_s, "Seconds since the motors started");
   verb->add_option(
       "--capture", options->capture,
-      "Write the received bytes of all runs to this file too (--source replay:FILE plays back the "
+      "Write the received bytes of all runs to this new file too (--source replay:FILE plays back the "
       "first)");
   verb->add_option("--speed", options->pace, "Virtual rig: times real time, or max")->capture_default_str();
   verb->add_option("--seed", options->seed, "Virtual rig: of everything it does")->capture_default_str();

@@ -32,12 +32,15 @@ live::LiveSettings live_settings(const LogOptions& options, Logging& logging, st
   return settings;
 }
 
+/// What tells the runs of a plan apart.
+auto key_of(const PlannedRun& run) { return std::tie(run.session, run.kind, run.location, run.repeat); }
+
 /// The loop that logs: one run at a time, what the plan or the page says.
 class LiveLogging {
  public:
   explicit LiveLogging(const LogOptions& options)
       : options_(options),
-        plan_(options.plan.empty() ? std::vector<PlannedRun>() : parse_plan(read_csv(options.plan))),
+        plan_(options.plan.empty() ? std::vector<PlannedRun>() : read_plan(options.plan)),
         logging_(options),
         page_(live_settings(options, logging_, plan_), stop_requested) {
     left_ = runs_left(logging_.file(), plan_);
@@ -86,8 +89,7 @@ class LiveLogging {
 
   /// With --yes a plan is walked once, as without a page: of a board that is dead every try would be partial.
   void have_tried(const PlannedRun& run) {
-    const auto key = [](const PlannedRun& r) { return std::tie(r.session, r.kind, r.location, r.repeat); };
-    std::erase_if(plan_, [&](const PlannedRun& planned) { return key(planned) == key(run); });
+    std::erase_if(plan_, [&](const PlannedRun& planned) { return key_of(planned) == key_of(run); });
     left_ = runs_left(logging_.file(), plan_);
   }
 
@@ -173,6 +175,9 @@ class LiveLogging {
       again.y_norm = old->y_norm;
       again.z_norm = old->z_norm;
     }
+    for (const PlannedRun& planned : plan_)
+      if (key_of(planned) == std::tie(old->session, old->kind, old->location, old->repeat))
+        again.own = planned.own;
     record(again, &order);
     if (!complete_ || !old->excluded.empty()) return;
     exclude_run(logging_.file(), name, fmt::format("redone as {}", here_.run));

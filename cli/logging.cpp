@@ -6,6 +6,8 @@
 #include "cli/live/book.h"
 #include "cli/live/run_alarms.h"
 #include "datasets/error.h"
+#include "datasets/locations.h"
+#include "datasets/open_space.h"
 #include "datasets/run_marks.h"
 
 #include <algorithm>
@@ -65,6 +67,16 @@ bool warn_of_unusable(const std::string& run, const Ledger& ledger) {
   return ledger.packets_corrupt > 0;
 }
 
+/// What was received once does not come again: it is never written over, not even by the rest of its plan.
+void check_capture(const std::string& capture) {
+  std::error_code error;
+  if (capture.empty() || !std::filesystem::is_regular_file(capture, error)) return;
+  if (std::filesystem::file_size(capture, error) == 0) return;
+  throw InputError(fmt::format(
+      "--capture {}: exists and is not empty; what was captured is not written over, name another file",
+      capture));
+}
+
 /// What no run sheet could hold would make every run of the file unreadable: it is refused before there is
 /// one.
 const LogOptions& checked(const LogOptions& options) {
@@ -77,6 +89,7 @@ const LogOptions& checked(const LogOptions& options) {
       options.source.starts_with(replay) &&
       std::filesystem::equivalent(options.source.substr(replay.size()), options.capture, error))
     throw InputError(fmt::format("--capture {}: this is what --source replays", options.capture));
+  check_capture(options.capture);
   if (options.repeat < 0) throw InputError(fmt::format("--repeat: {} is below 0", options.repeat));
   for (const auto& [column, option, value] : kConditionOptions)
     if (const auto given = options.*value)
@@ -124,6 +137,7 @@ Logging::Logging(const LogOptions& options)
 }
 
 int Logging::record(const PlannedRun& planned, const std::string& note, const LogWatch& watch) {
+  doubt_place(planned);
   const std::string name = free_name(file_);
   double start_s = now_s();
   std::unique_ptr<PacketSource> board;
@@ -146,6 +160,7 @@ int Logging::record(const PlannedRun& planned, const std::string& note, const Lo
   if (planned.y_norm && planned.z_norm)
     cells.insert(cells.end(), {{"y_norm", cell(*planned.y_norm)}, {"z_norm", cell(*planned.z_norm)}});
   cells.insert(cells.end(), conditions_.begin(), conditions_.end());
+  cells.insert(cells.end(), planned.own.begin(), planned.own.end());
   cells.emplace_back("source", options_.source);
 
   if (!options_.capture.empty() && !capture_.is_open()) capture_ = open_to_write(options_.capture);
@@ -178,6 +193,21 @@ int Logging::record(const PlannedRun& planned, const std::string& note, const Lo
   warn(fmt::format("{}: cannot be written any more, is the disk full? The recording is in {} all the same",
                    options_.capture, options_.db));
   return kProblemFound;
+}
+
+/// A label that is a slip of the pen: the run would be on no map.
+void Logging::doubt_place(const PlannedRun& planned) {
+  if (!info_.tunnel || planned.kind == RunKind::kTare || planned.y_norm || grid_point(planned.location))
+    return;
+  Run run;
+  run.location = planned.location;
+  for (const auto& [column, text] : planned.own)
+    if (const auto value = parse_number(text)) run.numbers.emplace(column, *value);
+  if (in_open_space(run) || !nowhere_.insert(planned.location).second) return;
+  warn(fmt::format(
+      "location '{}' is none of the tunnel's grid (H0 to H5, V-3 to V3) nor of open space (OS, GND…, CEIL…), "
+      "and has no y_norm and z_norm: its runs count as in no tunnel",
+      planned.location));
 }
 
 /// What a page would have marked the run with, as far as its frames tell.
@@ -302,6 +332,13 @@ int Logging::report(const std::string& name, const PlannedRun& planned, const Lo
     problem |= channel.stuck() || channel.clipped > 0;
   }
   return problem ? kProblemFound : kWell;
+}
+
+std::vector<PlannedRun> read_plan(const std::string& path) {
+  const Sheet sheet = read_csv(path);
+  std::vector<PlannedRun> plan = parse_plan(sheet);
+  for (const std::string& doubt : plan_doubts(sheet)) warn(doubt);
+  return plan;
 }
 
 std::vector<PlannedRun> runs_left(const CampaignFile& file, const std::vector<PlannedRun>& plan) {

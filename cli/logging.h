@@ -15,6 +15,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -84,6 +85,7 @@ class Logging {
  private:
   double pace() const;
   std::string alarms(const PlannedRun& planned, const LogOutcome& outcome);
+  void doubt_place(const PlannedRun& planned);
   void add_conditions(const std::optional<InstrumentReadings>& shown, RunKind kind);
   std::string means_text(const std::array<double, 4>& volts) const;
   void show(ProgressBar& bar, const LogProgress& progress) const;
@@ -107,10 +109,14 @@ class Logging {
   std::unique_ptr<PacketSource> source_;
   std::ofstream capture_;  // of all runs, from the first on
   RunCells conditions_;
+  std::set<std::string> nowhere_;  // locations that were warned of
 };
 
 /// The runs of a plan that the file does not hold: complete, and not excluded.
 std::vector<PlannedRun> runs_left(const CampaignFile& file, const std::vector<PlannedRun>& plan);
+
+/// The runs of a plan file; warns of what of it is not stored. Throws InputError as parse_plan does.
+std::vector<PlannedRun> read_plan(const std::string& path);
 
 /// `log --live`: the exit code.
 int run_live(const LogOptions& options);

@@ -2,6 +2,7 @@
 #include "analysis/model/model_store.h"
 #include "analysis/reduction_output.h"
 #include "cli/console.h"
+#include "cli/result.h"
 #include "cli/verb.h"
 #include "datasets/error.h"
 #include "datasets/first_few.h"
@@ -81,12 +82,9 @@ int run_map(const MapOptions& options) {
                                   {"runs", reduction.runs.size()}};
   const WrittenMaps written =
       write_maps(options.out, maps, {.nodes = options.nodes, .provenance = provenance.dump()});
-  CampaignFile(options.db, CampaignFile::Access::kWrite)
-      .add_document(
-          "map",
-          {program_version(), arguments(),
-           nlohmann::json{{"calibration", data.certificate_id}, {"model", reduction.model.version}}.dump()},
-          format_disturbance_map(written.map));
+  keep_result(options.db, "map",
+              nlohmann::json{{"calibration", data.certificate_id}, {"model", reduction.model.version}}.dump(),
+              format_disturbance_map(written.map));
   bool problem = false;
   for (const LeftOutRun& run : reduction.left_out) {
     problem = problem || run.problem;

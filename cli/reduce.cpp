@@ -4,8 +4,10 @@
 #include "analysis/reduction_output.h"
 #include "analysis/table_reduction.h"
 #include "cli/console.h"
+#include "cli/result.h"
 #include "cli/verb.h"
 #include "datasets/error.h"
+#include "datasets/output_place.h"
 #include "datasets/statistics_store.h"
 
 #include <algorithm>
@@ -52,7 +54,10 @@ bool refresh_from_raw(const ReduceOptions& options, CampaignData& data) {
       });
   const auto lines = disagreements(data.statistics, computed);
   for (const std::string& line : lines) warn(line);
-  if (!options.no_spectra && !lines.empty()) {
+  const bool anew = !options.no_spectra && !lines.empty();
+  if (anew && !can_be_changed(options.db)) {
+    warn(fmt::format("{}: cannot be written, so the new statistics are not stored in it", options.db));
+  } else if (anew) {
     CampaignFile file(options.db, CampaignFile::Access::kWrite);
     file.atomically([&] {
       for (const auto& [run, statistics] : computed) store_statistics(file, data.raw.at(run).id, statistics);
@@ -144,8 +149,7 @@ int reduce_campaign(const ReduceOptions& options, const CampaignFile& file) {
   if (!options.csv.empty())
     write_text(options.csv, locations_csv(summary, reduction, data.info.rig, convention));
   if (!options.runs_csv.empty()) write_text(options.runs_csv, runs_csv(data, reduction, convention));
-  CampaignFile(options.db, CampaignFile::Access::kWrite)
-      .add_document("reduction", {program_version(), arguments(), inputs_json(data, reduction)}, json);
+  keep_result(options.db, "reduction", inputs_json(data, reduction), json);
   if (options.json)
     fmt::print("{}\n", json);
   else
@@ -217,6 +221,7 @@ int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
 }
 
 int run_reduce(const ReduceOptions& options) {
+  check_distinct({{"--csv", options.csv}, {"--runs-csv", options.runs_csv}, {"--plot", options.plot}});
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   return file.text("table.toml") ? reduce_table(options, file) : reduce_campaign(options, file);
 }

@@ -2,14 +2,19 @@
 
 #include "datasets/error.h"
 #include "datasets/locations.h"
+#include "datasets/run_columns.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <map>
 #include <numeric>
 #include <random>
 #include <set>
+#include <string_view>
 #include <tuple>
+
+#include <fmt/ranges.h>
 
 namespace tunnelrig {
 namespace {
@@ -131,6 +136,54 @@ void check_both_or_neither(const Sheet& sheet, std::size_t row, std::optional<do
     throw InputError(fmt::format("{}: one of y_norm and z_norm is missing", sheet.place(row)));
 }
 
+constexpr std::array<std::string_view, 7> kPlanColumns = {"session",    "kind",   "location", "repeat",
+                                                          "duration_s", "y_norm", "z_norm"};
+
+/// What a recording finds out by itself, or by options: a plan's word for it is no measurement.
+constexpr std::array<std::string_view, 12> kFilledIn = {"run",
+                                                        "start_utc",
+                                                        "raw",
+                                                        "source",
+                                                        "excluded",
+                                                        "alarms",
+                                                        "speed_rpm",
+                                                        "time_since_motor_start_s",
+                                                        "air_temperature_C",
+                                                        "air_pressure_Pa",
+                                                        "relative_humidity",
+                                                        "supply_voltage_V"};
+
+bool is_filled_in(std::string_view column) { return std::ranges::count(kFilledIn, column) > 0; }
+
+bool is_own(std::string_view column) {
+  return !column.empty() && !is_filled_in(column) && std::ranges::count(kPlanColumns, column) == 0;
+}
+
+/// Where other runs of the file have numbers, "NaN" could not be read among them.
+std::vector<std::pair<std::string, std::string>> own_cells(const Sheet& sheet, std::size_t row) {
+  std::vector<std::pair<std::string, std::string>> cells;
+  for (const std::string& column : sheet.columns) {
+    if (!is_own(column)) continue;
+    const std::string& cell = sheet.text(row, column);
+    cells.emplace_back(column, stands_for_no_number(cell) ? "" : cell);
+  }
+  return cells;
+}
+
+/// Once recorded, a cell that no run sheet can hold would make every run of the file unreadable.
+void check_as_runs(Sheet sheet) {
+  for (std::string& column : sheet.columns)
+    if (is_filled_in(column)) column.clear();  // not stored, so not to be checked
+  for (const char* column : {"run", "start_utc", "raw"}) sheet.ensure(column);
+  for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
+    auto cell = sheet.rows[row].cells.end() - 3;
+    *cell++ = fmt::format("{}", row);
+    *cell++ = "2000-01-01T00:00:00Z";
+    *cell = "any";
+  }
+  parse_runs(sheet, {});
+}
+
 }  // namespace
 
 PlanSettings thesis_plan() {
@@ -196,10 +249,28 @@ std::vector<PlannedRun> parse_plan(const Sheet& sheet) {
       throw InputError::at(sheet.file, sheet.rows[row].line, "session {}, {} {}, repeat {} is planned twice",
                            run.session, kind.empty() ? "thrust" : kind, run.location, run.repeat);
     }
+    run.own = own_cells(sheet, row);
     plan.push_back(std::move(run));
   }
+  check_as_runs(sheet);
   if (plan.empty()) throw InputError::in(sheet.file, "plans no run");
   return plan;
+}
+
+std::vector<std::string> plan_doubts(const Sheet& sheet) {
+  std::vector<std::string> filled_in, doubts;
+  for (const std::string& column : sheet.columns)
+    if (is_filled_in(column)) filled_in.push_back(column);
+  if (!filled_in.empty())
+    doubts.push_back(fmt::format("{}:1: not stored: {}; a recording fills that in by itself or by options",
+                                 sheet.file, fmt::join(filled_in, ", ")));
+  for (const std::string& column : sheet.columns)
+    if (const std::string_view known = known_but_for_case(column); !known.empty())
+      doubts.push_back(fmt::format("{}:1: column '{}' is kept as the runs' own; is '{}' meant?", sheet.file,
+                                   column, known));
+  if (std::ranges::count(sheet.columns, "") > 0)
+    doubts.push_back(fmt::format("{}:1: not stored: a column without a name", sheet.file));
+  return doubts;
 }
 
 std::vector<PlannedLocation> parse_locations(const Sheet& sheet) {

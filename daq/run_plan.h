@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace tunnelrig {
@@ -21,6 +22,7 @@ struct PlannedRun {
   int repeat = 1;
   double duration_s = 60;
   std::optional<double> y_norm, z_norm;
+  std::vector<std::pair<std::string, std::string>> own = {};  // columns of the user's, by name: cell
 };
 
 /// A location to plan for; coordinates only where the label does not say them.
@@ -52,8 +54,12 @@ std::vector<PlannedRun> make_plan(const PlanSettings& settings);
 
 Sheet plan_sheet(const std::vector<PlannedRun>& plan);
 
-/// Throws InputError naming file, line and column, and for a run planned twice.
+/// Columns beyond a plan's are the runs' own, but for those that a recording fills in. Throws InputError
+/// naming file, line and column, for a run planned twice, and for what no run sheet could hold.
 std::vector<PlannedRun> parse_plan(const Sheet& sheet);
+
+/// What of a plan is not stored, in sentences: columns that a recording fills in, or without a name.
+std::vector<std::string> plan_doubts(const Sheet& sheet);
 
 /// A user's own locations: a CSV with `location` and, where the label is not of the thesis's grid, `y_norm`
 /// and `z_norm`. Throws InputError naming file, line and column, and for a location named twice.

@@ -139,6 +139,10 @@ std::unique_ptr<UsbBoard> UsbBoard::open(const std::shared_ptr<UsbBus>& bus, con
                       board->identity_.protocol, static_cast<int>(TRW_USB_PROTOCOL));
     return nullptr;
   }
+  if (board->identity_.tick_hz == 0) {
+    why = "the board says that its clock runs at 0 Hz, so nothing of it has a time; flash its firmware anew";
+    return nullptr;
+  }
   return board;
 }
 

@@ -93,12 +93,6 @@ std::filesystem::path with_suffix(const std::filesystem::path& path, std::string
   return path.string() + std::string(suffix);
 }
 
-/// The file, and its folder for the journal beside it.
-bool is_writable(const std::filesystem::path& path) {
-  const std::filesystem::path folder = path.parent_path().empty() ? "." : path.parent_path();
-  return ::access(path.c_str(), W_OK) == 0 && ::access(folder.c_str(), W_OK) == 0;
-}
-
 bool has_no_journal(const std::filesystem::path& path) {
   std::error_code error;
   const std::filesystem::path journal = with_suffix(path, "-wal");
@@ -133,6 +127,11 @@ std::vector<std::filesystem::path> files_of_campaign(const std::filesystem::path
   return files;
 }
 
+bool can_be_changed(const std::filesystem::path& path) {
+  const std::filesystem::path folder = path.parent_path().empty() ? "." : path.parent_path();
+  return ::access(path.c_str(), W_OK) == 0 && ::access(folder.c_str(), W_OK) == 0;
+}
+
 void migrate(Database& database, std::string_view schema) {
   for (const SchemaPart& part : schema_parts(schema)) {
     if (part.version <= database.scalar_integer("PRAGMA user_version")) continue;
@@ -161,7 +160,7 @@ CampaignFile::CampaignFile(const std::filesystem::path& path, Access access) : p
   }
   // A reader that may write opens for writing all the same: SQLite lets only such a connection fold the
   // journal back into the file when it closes last, and a campaign should be one file wherever it can.
-  const bool writable = is_writable(path);
+  const bool writable = can_be_changed(path);
   if (access == Access::kWrite && !writable)
     throw InputError::in(path.string(), "cannot be written: the file and its folder must be writable");
   const int flags = access == Access::kRecord              ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE

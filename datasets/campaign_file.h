@@ -33,6 +33,9 @@ struct Document {
   std::string json;
 };
 
+/// Whether this user may write to the file and, for the journal beside it, in its folder.
+bool can_be_changed(const std::filesystem::path& path);
+
 /// One connection to a campaign file. Methods throw StorageError where the file cannot be read or written and
 /// InputError where its contents break a rule of the campaign format. Not for use by two threads at once.
 class CampaignFile {

@@ -24,7 +24,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kChunk_s = 0.1;  // no blob holds more
+constexpr double kChunk_s = 0.1;     // no blob holds more
+constexpr double kMostLost = 1e15;   // frames of one gap: some 20000 years
+constexpr double kLargest_V = 1e12;  // beyond it squares leave what statistics can hold
 
 struct FolderText {
   CampaignInfo info;
@@ -93,9 +95,10 @@ std::vector<Gap> read_gaps(const fs::path& path, std::uint64_t frames) {
       throw InputError(fmt::format("{}: {:g} is no frame index from 0 to {}, in ascending order",
                                    sheet.where(row, "first_frame"), first, frames));
     }
-    if (lost != std::floor(lost) || lost < 1 || lost > 1e15) {
-      throw InputError(fmt::format("{}: {:g} is no whole number of frames, 1 or more",
-                                   sheet.where(row, "frames_lost"), lost));
+    if (lost != std::floor(lost) || lost < 1 || lost > kMostLost) {
+      throw InputError(fmt::format("{}: {:g} is no whole number of frames, 1 {}",
+                                   sheet.where(row, "frames_lost"), lost,
+                                   lost > kMostLost ? "to 1e15" : "or more"));
     }
     const std::string& estimated = sheet.text(row, "estimated");
     if (!estimated.empty() && estimated != "0" && estimated != "1")
@@ -128,14 +131,15 @@ std::vector<std::string> unread_gaps(const fs::path& folder, const std::vector<R
 }
 
 template <typename Float>
-void check_finite(std::span<const std::byte> data, int channels, const std::string& file) {
+void check_volts(std::span<const std::byte> data, int channels, const std::string& file) {
   for (std::size_t i = 0; i < data.size() / sizeof(Float); ++i) {
     Float value;
     std::memcpy(&value, data.data() + i * sizeof(Float), sizeof(Float));
-    if (std::isfinite(value)) continue;
+    if (std::abs(static_cast<double>(value)) <= kLargest_V) continue;
     const auto wide = static_cast<std::size_t>(channels);
-    throw InputError::in(file, "frame {}, channel {} is {}; every voltage must be a finite number", i / wide,
-                         i % wide + 1, static_cast<double>(value));
+    throw InputError::in(file, "frame {}, channel {} is {:g}; every voltage must be {}", i / wide,
+                         i % wide + 1, static_cast<double>(value),
+                         std::isfinite(value) ? "at most 1e12 V, either way" : "a finite number");
   }
 }
 
@@ -147,9 +151,9 @@ void check_samples(const NpyFile& npy, const CampaignInfo& info, const Run& run)
                          npy.format().channels, info.rig.rotors);
   }
   if (npy.format().type == SampleType::kFloat32)
-    check_finite<float>(npy.data(), npy.format().channels, run.raw);
+    check_volts<float>(npy.data(), npy.format().channels, run.raw);
   if (npy.format().type == SampleType::kFloat64)
-    check_finite<double>(npy.data(), npy.format().channels, run.raw);
+    check_volts<double>(npy.data(), npy.format().channels, run.raw);
 }
 
 /// What the numbers of a run show that its bytes do not.
@@ -245,7 +249,7 @@ class RawImport {
     statistics.hash = raw->hash;
     check_statistics(statistics, info_, raw->npy.format(), raw->run, options_.allow_stuck);
     volts_.look_at(raw->run, raw->npy.format(), statistics);
-    overlaps_.look_at(raw->run, statistics);
+    overlaps_.look_at(raw->run, statistics, raw->gaps);
     store_statistics(file_, raw->id, statistics);
     summary_.raw_runs += 1;
     summary_.frames += raw->npy.frames();

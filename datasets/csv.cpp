@@ -313,10 +313,6 @@ bool is_data_base(const std::filesystem::path& path) {
   return in.read(begins.data(), static_cast<std::streamsize>(begins.size())) && begins == kMagic;
 }
 
-void keep_campaign_files(const std::filesystem::path& path) {
-  if (is_data_base(path)) cannot_write(path, "it is a campaign file; write to another name");
-}
-
 bool put(const std::filesystem::path& path, std::string_view text) {
   std::ofstream out(path, std::ios::binary);
   out.write(text.data(), static_cast<std::streamsize>(text.size()));
@@ -325,6 +321,10 @@ bool put(const std::filesystem::path& path, std::string_view text) {
 }
 
 }  // namespace
+
+void keep_campaign_files(const std::filesystem::path& path) {
+  if (is_data_base(path)) cannot_write(path, "it is a campaign file; write to another name");
+}
 
 std::ofstream open_to_write(const std::filesystem::path& path) {
   keep_campaign_files(path);

@@ -85,6 +85,9 @@ void make_folder(const std::filesystem::path& folder);
 /// Whole file as text; throws InputError where it cannot be read.
 std::string read_text(const std::filesystem::path& path);
 
+/// Throws InputError where a campaign file stands at a path that is to be written to.
+void keep_campaign_files(const std::filesystem::path& path);
+
 /// Opens a file to write bytes to as they come. Throws InputError where that cannot be, and where a campaign
 /// file is in the way.
 std::ofstream open_to_write(const std::filesystem::path& path);

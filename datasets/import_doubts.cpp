@@ -48,6 +48,16 @@ void doubt_columns(const Sheet& sheet, const std::vector<Run>& runs, Doubts& dou
   }
 }
 
+/// An index that another program wrote out, mostly.
+void doubt_nameless_columns(const Sheet& sheet, Doubts& doubts) {
+  const auto count = std::ranges::count(sheet.columns, "");
+  if (count == 0) return;
+  doubts.push_back(
+      fmt::format("{}:1: {} without a name: kept as it stands, for an exported campaign folder, and read by "
+                  "nothing; other exports are without it",
+                  sheet.file, count == 1 ? "a column" : fmt::format("{} columns", count)));
+}
+
 /// A column that is not read, or in a unit that no effect knows.
 void doubt_conditions(const Sheet& sheet, Doubts& doubts) {
   for (const std::string& column : sheet.columns) {
@@ -196,6 +206,7 @@ std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& ru
                                        const std::vector<Run>& runs) {
   Doubts doubts = info.unread;
   doubt_columns(runs_sheet, runs, doubts);
+  doubt_nameless_columns(runs_sheet, doubts);
   doubt_conditions(runs_sheet, doubts);
   doubt_labels(runs_sheet, runs, doubts);
   const UnitDoubts units = unit_doubts(runs_sheet, runs);
@@ -233,9 +244,11 @@ Doubts VoltDoubt::doubts() const {
   return {first_ + (runs_ > 1 ? fmt::format(" It is so in {} runs", runs_) : "")};
 }
 
-void OverlapDoubt::look_at(const Run& run, const RunStatistics& statistics) {
-  recordings_.push_back(
-      {run.run, run.line, run.start_s, run.start_s + statistics.elapsed_s(info_.daq.sample_rate_hz)});
+/// By all frames, since statistics cap the time that gaps may take.
+void OverlapDoubt::look_at(const Run& run, const RunStatistics& statistics, std::span<const Gap> gaps) {
+  auto frames = static_cast<double>(statistics.frames);
+  for (const Gap& gap : gaps) frames += static_cast<double>(gap.frames_lost);
+  recordings_.push_back({run.run, run.line, run.start_s, run.start_s + frames / info_.daq.sample_rate_hz});
 }
 
 Doubts OverlapDoubt::doubts() const {

@@ -6,15 +6,16 @@
 #include "datasets/run_statistics.h"
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
 namespace tunnelrig {
 
 /// A sentence each, naming file and line: keys of campaign.toml that nothing reads, columns that are ours but
-/// for capitals, columns of the user's that one text makes a label, sessions in another unit (unit_doubts.h),
-/// thrusts that no rotor of this size gives, a location at two places or off the grid, two runs of one array,
-/// sessions of more than a day, a sensor that seems stuck.
+/// for capitals or have no name, columns of the user's that one text makes a label, sessions in another unit
+/// (unit_doubts.h), thrusts that no rotor of this size gives, a location at two places or off the grid, two
+/// runs of one array, sessions of more than a day, a sensor that seems stuck.
 std::vector<std::string> import_doubts(const CampaignInfo& info, const Sheet& runs_sheet,
                                        const std::vector<Run>& runs);
 
@@ -38,7 +39,7 @@ class OverlapDoubt {
  public:
   explicit OverlapDoubt(const CampaignInfo& info) : info_(info) {}
 
-  void look_at(const Run& run, const RunStatistics& statistics);
+  void look_at(const Run& run, const RunStatistics& statistics, std::span<const Gap> gaps);
   std::vector<std::string> doubts() const;
 
  private:

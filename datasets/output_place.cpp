@@ -1,5 +1,6 @@
 #include "datasets/output_place.h"
 
+#include "datasets/csv.h"
 #include "datasets/error.h"
 
 #include <system_error>
@@ -17,7 +18,35 @@ std::string with_target(std::string message, const std::string& staged, const st
   return message;
 }
 
+/// Whether two paths name one file or folder, which may not be there yet.
+bool same_place(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  if (fs::is_other(fs::status(a, error))) return false;
+  return fs::weakly_canonical(fs::absolute(a, error), error) ==
+         fs::weakly_canonical(fs::absolute(b, error), error);
+}
+
 }  // namespace
+
+void check_distinct(const NamedPaths& paths) {
+  for (auto one = paths.begin(); one != paths.end(); ++one)
+    for (auto other = paths.begin(); other != one; ++other)
+      if (!one->second.empty() && !other->second.empty() && same_place(one->second, other->second))
+        throw InputError(fmt::format("{} {}: the same place as {} {}", one->first, one->second, other->first,
+                                     other->second));
+}
+
+void check_can_be_written(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_other(fs::status(path, error))) return;
+  if (fs::is_directory(path, error)) throw InputError::in(path.string(), "cannot be written: it is a folder");
+  keep_campaign_files(path);
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, error))
+    throw InputError::in(path.string(), "cannot be written: there is no folder {}", folder.string());
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    throw InputError::in(path.string(), "cannot be written: nothing can be made in {}", folder.string());
+}
 
 FoldersForOutput::FoldersForOutput(const fs::path& path) {
   std::error_code error;

@@ -3,6 +3,8 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace tunnelrig {
@@ -20,6 +22,17 @@ class FoldersForOutput {
  private:
   std::vector<std::filesystem::path> missing_;  // the innermost first
 };
+
+/// Options and the paths that they name, to be read or written; empty where they are not given.
+using NamedPaths = std::vector<std::pair<std::string, std::string>>;
+
+/// Throws InputError naming both options where two of them name one file or folder: the second would be
+/// written over the first. Devices and pipes take both.
+void check_distinct(const NamedPaths& paths);
+
+/// Throws InputError where write_text could not write there, before the work whose result it is: no folder to
+/// write in, a folder or a campaign file in the way.
+void check_can_be_written(const std::filesystem::path& path);
 
 /// Calls `write`, which makes as `staged`, or in it, what the user has asked for as `target`. Its InputErrors
 /// then name the target, which is all that the user knows of; what the file system refuses is an InputError

@@ -142,6 +142,18 @@ std::string column_toml(std::string_view section, const std::string& column, std
                      meaning.empty() ? "" : fmt::format("meaning = \"{}\"\n", meaning));
 }
 
+/// By the options' names: whoever gave them never sees the schema that they go into.
+void check_options(const SweepOptions& options) {
+  constexpr double kSmallest_m = 0.01, kLargest_m = 10;
+  if (const auto diameter_m = options.propeller_diameter_m;
+      diameter_m && !(*diameter_m >= kSmallest_m && *diameter_m <= kLargest_m))
+    throw InputError(fmt::format("--propeller-diameter-m {:g}: must be from {:g} to {:g}, in metres{}",
+                                 *diameter_m, kSmallest_m, kLargest_m,
+                                 *diameter_m > kLargest_m ? "; is it in millimetres?" : ""));
+  if (const auto poles = options.pole_count; poles && (*poles < 2 || *poles > 200 || *poles % 2 != 0))
+    throw InputError(fmt::format("--pole-count {}: must be an even number from 2 to 200", *poles));
+}
+
 std::string sweep_schema(Sheet& all, const std::vector<SweepColumns>& sweeps, const SweepOptions& options,
                          const std::string& source) {
   const auto thrust = column_starting(all, "Thrust");
@@ -180,6 +192,7 @@ std::string sweep_schema(Sheet& all, const std::vector<SweepColumns>& sweeps, co
 }  // namespace
 
 ObservationTable read_rcbenchmark(const std::filesystem::path& source, const SweepOptions& options) {
+  check_options(options);
   Sheet sweeps;
   if (!options.sweeps_csv.empty()) {
     sweeps = read_csv(options.sweeps_csv);

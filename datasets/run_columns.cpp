@@ -47,6 +47,11 @@ const std::vector<Quantity>& quantities() {
 
 }  // namespace
 
+bool stands_for_no_number(std::string_view cell) {
+  constexpr std::array<std::string_view, 7> kNone = {"nan", "na", "n/a", "#n/a", "null", "inf", "-inf"};
+  return std::ranges::count(kNone, lower_case(cell)) > 0;
+}
+
 bool is_made_of_times(std::string_view column) {
   constexpr std::array<std::string_view, 3> kMade = {"run_order", "hours_in_session", "hour_of_day"};
   return std::ranges::count(kMade, column) > 0;

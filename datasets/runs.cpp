@@ -10,7 +10,6 @@
 #include <cstdio>
 #include <ctime>
 #include <limits>
-#include <set>
 
 namespace tunnelrig {
 namespace {
@@ -65,12 +64,6 @@ void check_units(const Sheet& sheet) {
                          "column {}: this quantity is read as {}; convert it and rename the column", column,
                          ours);
   }
-}
-
-/// How spreadsheets and programs write that there is no number.
-bool stands_for_no_number(std::string_view cell) {
-  static const std::set<std::string_view> kNone = {"nan", "na", "n/a", "#n/a", "null", "inf", "-inf"};
-  return kNone.contains(lower_case(cell));
 }
 
 /// Numbers among what may be no number; labels else.

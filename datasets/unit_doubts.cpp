@@ -4,7 +4,6 @@
 #include "datasets/first_few.h"
 #include "datasets/unit_list.h"
 
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -14,17 +13,6 @@
 namespace tunnelrig {
 namespace {
 
-struct Suffix {
-  std::string_view end, unit;
-};
-/// The longer before what they end in.
-constexpr std::array<Suffix, 25> kSuffixes = {
-    {{"_rpm", "rpm"}, {"_rad_s", "rad/s"}, {"_cm_s", "cm/s"}, {"_m_s", "m/s"}, {"_km_h", "km/h"},
-     {"_N_m", "N·m"}, {"_Nm", "N·m"},      {"_mm", "mm"},     {"_cm", "cm"},   {"_m", "m"},
-     {"_C", "°C"},    {"_K", "K"},         {"_F", "°F"},      {"_Pa", "Pa"},   {"_hPa", "hPa"},
-     {"_kPa", "kPa"}, {"_N", "N"},         {"_gf", "gf"},     {"_V", "V"},     {"_mV", "mV"},
-     {"_A", "A"},     {"_W", "W"},         {"_deg", "deg"},   {"_Hz", "Hz"},   {"_percent", "%"}}};
-
 /// A number without unit may be anything. Times are set by who plans a session, and a minute and an hour are
 /// a factor of 60 apart as a second and a minute are.
 bool says_a_unit(const Unit& unit) {
@@ -33,9 +21,8 @@ bool says_a_unit(const Unit& unit) {
 }
 
 const Unit* unit_of_name(std::string_view column) {
-  for (const Suffix& suffix : kSuffixes)
-    if (column.ends_with(suffix.end)) return &unit_from_name(suffix.unit);
-  return nullptr;
+  const std::string_view unit = unit_in_ending(column);
+  return unit.empty() ? nullptr : &unit_from_name(unit);
 }
 
 std::string rounded(double value) {

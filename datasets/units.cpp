@@ -117,6 +117,18 @@ constexpr std::array<Unit, 100> kUnits = {{
     {"gf/W", "efficiency", kGravity * 1e-3, 0},
 }};
 
+struct Suffix {
+  std::string_view end, unit;
+};
+
+/// Of docs/campaign-folder.md; the longer before what they end in.
+constexpr std::array<Suffix, 25> kSuffixes = {
+    {{"_rpm", "rpm"}, {"_rad_s", "rad/s"}, {"_cm_s", "cm/s"}, {"_m_s", "m/s"}, {"_km_h", "km/h"},
+     {"_N_m", "N·m"}, {"_Nm", "N·m"},      {"_mm", "mm"},     {"_cm", "cm"},   {"_m", "m"},
+     {"_C", "°C"},    {"_K", "K"},         {"_F", "°F"},      {"_Pa", "Pa"},   {"_hPa", "hPa"},
+     {"_kPa", "kPa"}, {"_N", "N"},         {"_gf", "gf"},     {"_V", "V"},     {"_mV", "mV"},
+     {"_A", "A"},     {"_W", "W"},         {"_deg", "deg"},   {"_Hz", "Hz"},   {"_percent", "%"}}};
+
 }  // namespace
 
 std::span<const Unit> known_units() { return kUnits; }
@@ -141,6 +153,12 @@ std::string_view unit_after_conversion(std::string_view name) {
                         return other.quantity == unit.quantity && other.factor == 1 && other.offset == 0;
                       })
       ->name;
+}
+
+std::string_view unit_in_ending(std::string_view column) {
+  const auto* found = std::find_if(kSuffixes.begin(), kSuffixes.end(),
+                                   [&](const Suffix& suffix) { return column.ends_with(suffix.end); });
+  return found == kSuffixes.end() ? std::string_view() : found->unit;
 }
 
 std::string_view unit_in_header(std::string_view header) {

@@ -30,6 +30,9 @@ const Unit& unit_from_name(std::string_view name);
 /// The unit that values of this one are in once converted: "N" for "gf", "1" for "%".
 std::string_view unit_after_conversion(std::string_view name);
 
+/// The unit that a column's name ends in: "mm" for "cable_mm"; empty where it ends in none.
+std::string_view unit_in_ending(std::string_view column);
+
 /// "Thrust (gf)" → "gf"; empty where the header carries no unit in parentheses.
 std::string_view unit_in_header(std::string_view header);
 

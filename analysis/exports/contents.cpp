@@ -1,6 +1,7 @@
 #include "analysis/exports/contents.h"
 
 #include "analysis/exports/table_builder.h"
+#include "datasets/units.h"
 
 #include <algorithm>
 #include <array>
@@ -14,15 +15,20 @@ struct NameUnit {
   std::string_view ending, unit;
 };
 
-/// Longer endings first: "_V_per_N" is not in newtons.
-constexpr std::array<NameUnit, 20> kUnits = {
-    {{"_V_per_N", "V/N"}, {"_N_per_V", "N/V"}, {"_kg_m3", "kg/m^3"},
-     {"_ppm_h", "ppm/h"}, {"_percent", "%"},   {"_humidity", "1"},
-     {"_m_s", "m/s"},     {"_norm", "1"},      {"_rpm", "rpm"},
-     {"_hz", "Hz"},       {"_Pa", "Pa"},       {"_m2", "m^2"},
-     {"_deg", "deg"},     {"_N", "N"},         {"_V", "V"},
-     {"_C", "degC"},      {"_K", "K"},         {"_R", "propeller radii"},
-     {"_s", "s"},         {"_m", "m"}}};
+/// Endings of the suite's own, which come before those that users' columns may have: "_V_per_N" is not in
+/// newtons.
+constexpr std::array<NameUnit, 9> kUnits = {{{"_V_per_N", "V/N"},
+                                             {"_N_per_V", "N/V"},
+                                             {"_kg_m3", "kg/m^3"},
+                                             {"_ppm_h", "ppm/h"},
+                                             {"_humidity", "1"},
+                                             {"_norm", "1"},
+                                             {"_hz", "Hz"},
+                                             {"_m2", "m^2"},
+                                             {"_R", "propeller radii"}}};
+
+/// What Octave cannot read, in ASCII.
+constexpr std::array<NameUnit, 3> kInAscii = {{{"°C", "degC"}, {"°F", "degF"}, {"N·m", "N m"}}};
 
 constexpr std::size_t kLongestName = 63;  // of MATLAB
 
@@ -61,9 +67,12 @@ std::string Series::column_name(std::size_t column) const {
 }
 
 std::string_view unit_in_name(std::string_view name) {
-  const auto* found = std::find_if(kUnits.begin(), kUnits.end(),
-                                   [&](const NameUnit& one) { return name.ends_with(one.ending); });
-  return found == kUnits.end() ? std::string_view() : found->unit;
+  for (const NameUnit& own : kUnits)
+    if (name.ends_with(own.ending)) return own.unit;
+  const std::string_view unit = unit_in_ending(name);
+  for (const NameUnit& other : kInAscii)
+    if (unit == other.ending) return other.unit;
+  return unit.empty() && name.ends_with("_s") ? "s" : unit;
 }
 
 std::string plain_name(std::string_view name) {

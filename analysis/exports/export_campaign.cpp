@@ -104,7 +104,10 @@ void add_results(const CampaignFile& file, const CampaignData& data, const Setti
 void add_models(const CampaignFile& file, const CampaignData& data, Contents& contents) {
   if (data.certificate) append(contents.tables, calibration_tables(*data.certificate));
   const std::vector<StoredModel> models = stored_models(file);
-  if (models.empty()) return;
+  if (models.empty()) {
+    contents.absent.push_back({"models", "no effect has been adopted yet (`explain --adopt`)"});
+    return;
+  }
   append(contents.tables, model_tables(models));
   contents.groups.push_back(model_covariance_group(models));
 }

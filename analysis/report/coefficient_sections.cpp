@@ -1,4 +1,5 @@
 // C_T and U by location, and what of them stands in open space.
+#include "analysis/conventions.h"
 #include "analysis/reduction_output.h"
 #include "analysis/report/sections.h"
 #include "datasets/locations.h"
@@ -41,8 +42,10 @@ double z_norm_of(const Placement& placement, const CampaignInfo& info) {
 
 Json locations_section(const Material& material) {
   if (!material.summary) return absent(fmt::format("There is no C_T: {}.", material.not_reduced));
-  return Json::parse(
-      reduction_json(material.data, *material.reduction, *material.summary, Convention::kThesis));
+  Json json =
+      Json::parse(reduction_json(material.data, *material.reduction, *material.summary, Convention::kThesis));
+  json["area"] = area_in_words(material.data.info.rig);
+  return json;
 }
 
 Json uneven_section(const Material& material) {

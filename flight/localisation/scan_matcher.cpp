@@ -300,7 +300,7 @@ struct ScanMatcher::Work {
         !std::isfinite(motion.roll_acceleration_rad_s2) || !std::isfinite(motion.sweep_s))
       throw InputError::in("scan", "the motion during its sweep is not finite");
     attitude = section_projection(imu);
-    if (!(attitude.determinant() >= kMost_tilt_cosine))
+    if (!can_match(imu))
       throw InputError::in("scan",
                            "pitch {} and yaw {} rad turn the scan plane over 75° from the cross-section",
                            imu.pitch_rad, imu.yaw_rad);
@@ -356,6 +356,10 @@ ScanMatcher::ScanMatcher(const CrossSection& section, const MatcherSettings& set
 ScanMatcher::~ScanMatcher() = default;
 ScanMatcher::ScanMatcher(ScanMatcher&&) noexcept = default;
 ScanMatcher& ScanMatcher::operator=(ScanMatcher&&) noexcept = default;
+
+bool ScanMatcher::can_match(const Attitude& attitude) {
+  return section_projection(attitude).determinant() >= kMost_tilt_cosine;
+}
 
 Eigen::Vector2d ScanMatcher::moved_per_roll_m() const { return work_->moved_per_roll_m(); }
 

@@ -107,6 +107,9 @@ class ScanMatcher {
   Match match(const Scan& scan, const Attitude& attitude,
               const std::optional<Eigen::Vector2d>& prior = std::nullopt, const SweepMotion& motion = {});
 
+  /// Whether a scan at this attitude can be matched at all: its plane is within 75° of the cross-section.
+  static bool can_match(const Attitude& attitude);
+
   /// By how much the position of the last match moves for each radian that the attitude's roll was too large,
   /// m. The scan turns about the LIDAR, so that a match far from the middle of the walls in sight moves more.
   /// Zero where nothing matched.

@@ -108,8 +108,12 @@ void Localisation::take_scan() {
 
 void Localisation::correct() {
   waiting_ = false;
-  const Match match = matcher_.match(scan_, scan_attitude_, kinematic_state().head<2>(), scan_motion_);
   ++matches_;
+  if (!ScanMatcher::can_match(scan_attitude_)) {  // it is overturning, and may be lost before long
+    ++rejected_;
+    return;
+  }
+  const Match match = matcher_.match(scan_, scan_attitude_, kinematic_state().head<2>(), scan_motion_);
   bool used = match.accepted;
   if (used) {
     const MeasuredPosition position = measured(match);

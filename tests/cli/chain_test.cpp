@@ -23,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using test::ProgramResult;
 using testing::HasSubstr;
+using testing::Not;
 
 struct Chain : testing::Test {
   test::TemporaryFolder folder;
@@ -167,6 +168,42 @@ TEST_F(Chain, ACaptureHoldsEveryRunOfAPlan) {
   EXPECT_EQ(full.code, 1);
   EXPECT_THAT(full.error, HasSubstr("/dev/full: cannot be written any more"));
   EXPECT_THAT(full.out, HasSubstr("R0003  S1 OT #3"));
+}
+
+TEST_F(Chain, ACaptureIsNotWrittenOver) {
+  write_text(folder / "bytes", "of an earlier call");
+  const ProgramResult result =
+      run("log --db c.db --location OT --session S1 --duration 1 --speed max --capture bytes");
+  EXPECT_EQ(result.code, 2);
+  EXPECT_THAT(result.error, HasSubstr("--capture bytes: exists and is not empty"));
+  EXPECT_EQ(read_text(folder / "bytes"), "of an earlier call");
+  EXPECT_FALSE(fs::exists(folder / "c.db"));
+}
+
+TEST_F(Chain, APlansOwnColumnsAreStoredWithItsRuns) {
+  write_text(
+      folder / "plan.csv",
+      "session,location,repeat,duration_s,grille,air_pressure_Pa,cable_mm,tip_cm_s\nS1,OT,1,1,open,1,3,4\n");
+  const ProgramResult result = run("log --db c.db --plan plan.csv --speed max");
+  EXPECT_EQ(result.code, 0);
+  EXPECT_THAT(result.error, HasSubstr("not stored: air_pressure_Pa"));
+  const auto runs = CampaignFile(folder / "c.db", CampaignFile::Access::kRead).runs();
+  EXPECT_EQ(runs.at(0).labels.at("grille"), "open");
+  EXPECT_GT(runs.at(0).number("air_pressure_Pa"), 9e4);
+  const ProgramResult exported = run("export --db c.db --format csv --parts models typed");
+  EXPECT_EQ(exported.code, 1) << "asked for by name";
+  EXPECT_THAT(exported.out, HasSubstr("without models: no effect has been adopted yet"));
+  const std::string columns = read_text(folder / "typed/columns.csv");
+  EXPECT_THAT(columns, HasSubstr("runs,cable_mm,mm,"));
+  EXPECT_THAT(columns, HasSubstr("runs,tip_cm_s,cm/s,"));
+}
+
+TEST_F(Chain, ARunThatIsThereAlreadyIsSaid) {
+  const std::string log = "log --db c.db --location OT --session S1 --duration 1 --speed max";
+  EXPECT_THAT(run(log).error, Not(HasSubstr("already")));
+  const ProgramResult again = run(log);
+  EXPECT_EQ(again.code, 0);
+  EXPECT_THAT(again.error, HasSubstr("holds a complete thrust run of session S1 at OT, repeat 1, already"));
 }
 
 /// It reads what it was given before it takes the file's write lock: a recorder would wait for it.

@@ -8,6 +8,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <linux/capability.h>
+#include <sys/prctl.h>
 
 namespace tunnelrig {
 namespace {
@@ -100,6 +102,66 @@ TEST_F(FailedWrites, OfAFlightLeaveNoEmptyFolder) {
   EXPECT_EQ(result.code, 2);
   EXPECT_THAT(result.error, EndsWith("a/b/comparison.csv: cannot be written: File too large\n"));
   EXPECT_THAT(left(), testing::ElementsAre("short.toml"));
+}
+
+bool says(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
+
+/// As a user whom the rights of files bind, be it root: 0 where all is as it should be, else what to look
+/// for.
+int derive_read_only(const fs::path& place) {
+  ::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0);  // refused to whoever does not have it anyway
+  const ProgramResult reduced =
+      test::run_program(place, "reduce --db kept/c.db --csv a.csv --runs-csv b.csv --json");
+  const ProgramResult anew = test::run_program(place, "reduce --db kept/c.db --from-raw");
+  const ProgramResult mapped = test::run_program(place, "map --db kept/c.db --out maps");
+  if (reduced.code != 0 || anew.code != 0 || mapped.code != 0) return 1;
+  if (!says(reduced.error, "kept/c.db: cannot be written, so this reduction is not stored in it")) return 2;
+  if (!reduced.out.starts_with("{") || !fs::exists(place / "a.csv") || !fs::exists(place / "b.csv")) return 3;
+  if (!says(mapped.error, "kept/c.db: cannot be written, so this map is not stored in it")) return 4;
+  return says(mapped.out, "change of C_T against OT") && fs::exists(place / "maps") ? 0 : 5;
+}
+
+TEST_F(FailedWrites, AFileThatCannotBeWrittenIsReducedAndMappedAllTheSame) {
+  const auto run = [&](const std::string& arguments) {
+    return test::run_program(folder.path(), arguments).code;
+  };
+  fs::create_directory(folder / "kept");
+  ASSERT_EQ(run("plan --out p.csv --tunnel-only --repeats 2 --duration 1"), 0);
+  ASSERT_EQ(run("log --db kept/c.db --plan p.csv --speed max"), 0);
+  ASSERT_EQ(run("calibrate --db kept/c.db"), 0);
+  fs::permissions(folder / "kept/c.db", fs::perms{0444});
+  fs::permissions(folder / "kept", fs::perms{0555});
+  EXPECT_EXIT(std::_Exit(derive_read_only(folder.path())), testing::ExitedWithCode(0), "");
+  fs::permissions(folder / "kept", fs::perms::owner_all);
+  EXPECT_TRUE(CampaignFile(folder / "kept/c.db", CampaignFile::Access::kRead).documents("map").empty());
+}
+
+TEST_F(FailedWrites, OfAReductionAreSeenBeforeOneGoesOverTheOther) {
+  const ProgramResult result =
+      test::run_program(folder.path(), "reduce --db c.db --csv a.csv --runs-csv ./a.csv");
+  EXPECT_EQ(result.code, 2);
+  EXPECT_THAT(result.error, HasSubstr("--runs-csv ./a.csv: the same place as --csv a.csv"));
+}
+
+/// Tuning or flying first would take much longer than this test may.
+TEST_F(FailedWrites, OfFlightsAreSeenBeforeAnyIsFlown) {
+  fs::create_directory(folder / "a");
+  { CampaignFile(folder / "c.db", CampaignFile::Access::kRecord).set_text("table.toml", ""); }
+  for (const auto& [options, why] :
+       {std::pair("--tune a", "a: cannot be written: it is a folder"),
+        {"--json a", "a: cannot be written: it is a folder"},
+        {"--tune c.db", "c.db: cannot be written: it is a campaign file"},
+        {"--json c.db --runs 100000", "c.db: cannot be written: it is a campaign file"},
+        {"--json none/f.json", "there is no folder none"},
+        {"--json f --tune ./f", "--tune ./f: the same place as --json f"},
+        {"--json f --out f --runs 100000", "--out f: the same place as --json f"},
+        {"--gains f --tune f", "--tune f: the same place as --gains f"}}) {
+    const ProgramResult result =
+        test::run_program(folder.path(), fmt::format("fly {}", options), "ulimit -t 5");
+    EXPECT_EQ(result.code, 2) << options;
+    EXPECT_EQ(result.out, "") << options;
+    EXPECT_THAT(result.error, HasSubstr(why));
+  }
 }
 
 }  // namespace

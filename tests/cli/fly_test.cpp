@@ -102,7 +102,9 @@ TEST_F(Fly, SaysThatAFlightWasLost) {
   ASSERT_GT(one["lost"], 0);
   for (const char* error : {"rms_y_mm", "rms_z_mm", "max_y_mm", "max_z_mm", "ci95_rms_mm"})
     EXPECT_TRUE(one.at(error).is_null()) << error;
-  EXPECT_THAT(run(crash).out, HasSubstr(" of 3 flights lost"));
+  const ProgramResult said = run(crash);
+  EXPECT_THAT(said.out, HasSubstr(" of 3 flights lost"));
+  EXPECT_THAT(said.error, HasSubstr("--motor-loss without --weak-rotor: it is rotor 1 that lost thrust"));
 }
 
 TEST_F(Fly, IsTheSameToTheByteForASeedWhateverTheNumberOfThreads) {

@@ -25,13 +25,11 @@ struct Streams : testing::Test {
     const auto packet = test::packet_bytes(spec);
     bytes.append(reinterpret_cast<const char*>(packet.data()), packet.size());
   }
-  ProgramResult log(const std::string& duration) const {
+  ProgramResult log(const std::string& duration, const std::string& location = "OT") const {
     std::ofstream(folder / "bytes", std::ios::binary) << bytes;
     return test::run_program(
-        folder.path(),
-        "log --db c.db --location OT --session S1 --temperature-C 20 --source replay:bytes "
-        "--duration " +
-            duration);
+        folder.path(), "log --db c.db --session S1 --temperature-C 20 --source replay:bytes --location " +
+                           location + " --duration " + duration);
   }
 };
 
@@ -87,6 +85,12 @@ TEST_F(Streams, WithoutAPacketNoChannelIsStuck) {
   EXPECT_THAT(result.out, HasSubstr("0 frames, 0 lost, no frames"));
   EXPECT_THAT(result.error, HasSubstr("run R0001: 32 bytes arrived that are no packets of version 1"));
   EXPECT_THAT(result.error, Not(HasSubstr("stuck")));
+}
+
+TEST_F(Streams, ALocationThatNoMapHasIsSaid) {
+  for (std::uint64_t i = 0; i < 50; ++i) add({.first = 16 * i, .ticks_per_frame = 63000});
+  EXPECT_THAT(log("0.6", "H9V9").error, HasSubstr("location 'H9V9' is none of the tunnel's grid"));
+  EXPECT_THAT(log("0.6", "GND2").error, Not(HasSubstr("none of the tunnel's grid")));
 }
 
 }  // namespace

@@ -151,5 +151,27 @@ TEST(Plan, CoordinatesAreThoseThatARunSheetCanHold) {
   }
 }
 
+TEST(Plan, ColumnsOfItsOwnAreTheRuns) {
+  const Sheet sheet = parse_csv(
+      "session,location,repeat,Kind,grille_percent,,speed_rpm,note,later\nS1,OT,1,tare,3,0,5000,windy,NaN\n"
+      "S1,OT,2,tare,,1,5000,,NaN\n",
+      "plan.csv");
+  const auto plan = parse_plan(sheet);
+  using Own = std::vector<std::pair<std::string, std::string>>;
+  EXPECT_EQ(plan[0].own, (Own{{"Kind", "tare"}, {"grille_percent", "3"}, {"note", "windy"}, {"later", ""}}));
+  EXPECT_EQ(plan[1].own, (Own{{"Kind", "tare"}, {"grille_percent", ""}, {"note", ""}, {"later", ""}}));
+  EXPECT_THAT(plan_doubts(sheet),
+              testing::ElementsAre(HasSubstr("plan.csv:1: not stored: speed_rpm;"),
+                                   HasSubstr("column 'Kind' is kept as the runs' own; is 'kind' meant?"),
+                                   HasSubstr("a column without a name")));
+  EXPECT_THAT(plan_doubts(plan_sheet(plan)), testing::IsEmpty());
+  const auto refuse = [](const std::string& column, const std::string& cell) {
+    const std::string csv = "session,location,repeat," + column + "\nS1,OT,1," + cell + "\n";
+    return message_of([&] { parse_plan(parse_csv(csv, "plan.csv")); });
+  };
+  EXPECT_THAT(refuse("tunnel_airspeed_m_s", "900"), HasSubstr("plan.csv:2: column tunnel_airspeed_m_s: 900"));
+  EXPECT_THAT(refuse("air_pressure_hPa", "990"), HasSubstr("this quantity is read as air_pressure_Pa"));
+}
+
 }  // namespace
 }  // namespace tunnelrig

@@ -8,6 +8,7 @@
 #include "support/message_of.h"
 #include "support/temporary_folder.h"
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -99,6 +100,27 @@ TEST_F(Folder, GapsComeBackWithTheColumnsThatTheyHad) {
     EXPECT_EQ(contents(out), contents(source));
     for (const fs::path& path : {source, db, out, again}) fs::remove_all(path);
   }
+}
+
+TEST_F(Folder, VoltsThatAreNoneAreRefused) {
+  const RawFormat floats{SampleType::kFloat64, 4};
+  for (const auto& [value, why] :
+       {std::pair(1e100, "is 1e+100; every voltage must be at most 1e12 V, either way"),
+        {-2e12, "is -2e+12; every voltage must be at most 1e12 V, either way"},
+        {std::nan(""), "is nan; every voltage must be a finite number"}}) {
+    fs::remove_all(source);
+    campaign.write(source);
+    auto frames = test::example_frames(400, 9, floats);
+    std::memcpy(frames.data() + 42 * sizeof(double), &value, sizeof(double));
+    test::write_npy(source / "raw/R2.npy", floats, 400, frames);
+    EXPECT_EQ(import_refusal(), std::string("raw/R2.npy: frame 10, channel 3 ") + why);
+  }
+}
+
+TEST_F(Folder, LostFramesHaveALimit) {
+  campaign.write(source);
+  write_text(source / "raw/R2.gaps.csv", "first_frame,frames_lost\n10,1e30\n");
+  EXPECT_THAT(import_refusal(), testing::HasSubstr("1e+30 is no whole number of frames, 1 to 1e15"));
 }
 
 TEST_F(Folder, GapsOfNoArrayAreSaid) {

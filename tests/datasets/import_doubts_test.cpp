@@ -163,7 +163,7 @@ TEST(ImportDoubts, VoltsBeyondTheConverterAreNoVolts) {
 }
 
 TEST(ImportDoubts, RunsDoNotBeginWithinOthers) {
-  const auto doubts_at = [](double rate_hz, const std::vector<double>& starts_s) {
+  const auto doubts_at = [](double rate_hz, const std::vector<double>& starts_s, std::uint64_t lost = 1) {
     CampaignInfo info = parse_campaign_toml(kToml, "campaign.toml");
     info.daq.sample_rate_hz = rate_hz;
     OverlapDoubt doubt(info);
@@ -175,7 +175,7 @@ TEST(ImportDoubts, RunsDoNotBeginWithinOthers) {
       run.start_s = start_s;
       RunStatistics statistics;
       statistics.frames = 80000;
-      doubt.look_at(run, statistics);
+      doubt.look_at(run, statistics, std::vector<Gap>{{.first_frame = 100, .frames_lost = lost}});
     }
     return doubt.doubts();
   };
@@ -185,6 +185,16 @@ TEST(ImportDoubts, RunsDoNotBeginWithinOthers) {
       ElementsAre("runs.csv:3: run R3 begins 120 s after run R2, which by its frames lasts 6e+04 s: are "
                   "daq.sample_rate_hz = 1.33333 and start_utc right? It is so of 2 runs"));
   EXPECT_THAT(doubts_at(4000. / 3, {500, 500}), ElementsAre(HasSubstr("begins 0 s after run R2")));
+  EXPECT_THAT(doubts_at(4000. / 3, {0, 200}, 100'000'000'000),
+              ElementsAre(HasSubstr("run R2, which by its frames lasts 7.5e+07 s")))
+      << "lost ones are frames too, however many";
+}
+
+TEST(ImportDoubts, AColumnHasAName) {
+  EXPECT_THAT(
+      doubts(kToml,
+             ",run,location,repeat,session,start_utc,raw\n0,A,OT,1,S,2026-03-02T08:00:00Z,raw/A.npy\n"),
+      ElementsAre(HasSubstr("runs.csv:1: a column without a name: kept as it stands")));
 }
 
 TEST(ImportDoubts, ALocationStandsAtOnePlace) {

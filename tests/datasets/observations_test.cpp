@@ -260,6 +260,14 @@ TEST(Rcbenchmark, SweepsWithoutATachometerAreThrustAlone) {
               HasSubstr("--pole-count: no column Motor Optical Speed or Motor Electrical Speed has a value"));
 }
 
+TEST(Rcbenchmark, OptionsAreRefusedByTheirNames) {
+  EXPECT_THAT(
+      message_of([] { read_rcbenchmark("any", {.propeller_diameter_m = 127}); }),
+      HasSubstr("--propeller-diameter-m 127: must be from 0.01 to 10, in metres; is it in millimetres?"));
+  EXPECT_THAT(message_of([] { read_rcbenchmark("any", {.pole_count = 7}); }),
+              HasSubstr("--pole-count 7: must be an even number"));
+}
+
 TEST(Rcbenchmark, SemicolonsAreNamed) {
   const test::TemporaryFolder folder;
   write_text(folder / "s.csv", "Thrust (N);Voltage (V);Current (A)\n1;12;3\n");

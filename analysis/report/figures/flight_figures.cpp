@@ -49,27 +49,53 @@ std::string curves(const Json& flight, std::size_t shown, const char* columns) {
   return text + "\n";
 }
 
+/// Between the labels of an axis in metres, so that each has 11 mm: 1, 2 or 5 times a power of ten.
+double tic_step_m(const Json& walls, double plot_mm) {
+  constexpr double kLabel_mm = 11;
+  double low_m = 0, high_m = 0;
+  for (const Json& corner : walls) {
+    low_m = std::min(low_m, corner[0].get<double>());
+    high_m = std::max(high_m, corner[0].get<double>());
+  }
+  if (!(high_m > low_m)) return 1;
+  const double least_m = (high_m - low_m) * kLabel_mm / plot_mm;
+  const double decade_m = std::pow(10, std::floor(std::log10(least_m)));
+  for (const double step : {1., 2., 5.})
+    if (step * decade_m >= least_m) return step * decade_m;
+  return 10 * decade_m;
+}
+
 Figure paths_figure(const Json& flight, const std::string& name, double width_mm) {
   const std::size_t shown = std::min(flight["controllers"].size(), kMostPaths);
-  constexpr double kLeft_mm = 15, kRight_mm = 2, kKey_mm = 8.5, kStrip_mm = 22, kLabel_mm = 10, kGap_mm = 2.5,
+  constexpr double kLeft_mm = 15, kRight_mm = 2, kStrip_mm = 22, kLabel_mm = 10, kGap_mm = 2.5,
                    kTitle_mm = 12;
+  const int across = width_mm < 75 ? 2 : 3;  // names have as many letters in a narrow figure
+  const double key_mm = across == 3 ? 8.5 : 12;
   const double path_mm = std::min(0.72 * width_mm, 110.0);
-  const Sheet sheet{width_mm, kKey_mm + path_mm + kLabel_mm + 2 * kStrip_mm + kGap_mm + kLabel_mm};
-  double top = sheet.height_mm - kKey_mm;
+  const Sheet sheet{width_mm, key_mm + path_mm + kLabel_mm + 2 * kStrip_mm + kGap_mm + kLabel_mm};
+  double top = sheet.height_mm - key_mm;
   std::string script = look() + blocks_of(flight, shown) + "set multiplot\n";
   script += sheet.axes({kLeft_mm, width_mm - kRight_mm, top - path_mm, top}, "y [m]", "z above the floor [m]",
                        kTitle_mm);
   std::vector<LegendEntry> entries{{"tunnel", "#333333", 0, 1, 1.6}, {"reference", "#000000", 0, 1, 0.5}};
   for (std::size_t i = 0; i < shown; ++i) entries.push_back(look_of_controller(flight, i));
-  script += legend(sheet, entries, sheet.height_mm - 2.2, 3, kLeft_mm);
+  script += legend(sheet, entries, sheet.height_mm - 2.2, across, kLeft_mm);
+  const double step_m = tic_step_m(flight["walls"], std::min(path_mm, width_mm - kLeft_mm - kRight_mm));
+  script += fmt::format("set xtics {0:g}\nset ytics {0:g}\n", step_m);
   script +=
-      "set size ratio -1\nset offsets graph 0.03, graph 0.03, graph 0.03, graph 0.03\n"
+      "set xrange [*:*] noextend\nset yrange [*:*] noextend\nset size ratio -1\nset offsets graph 0.03, "
+      "graph 0.03, graph 0.03, graph "
+      "0.03\n"
       "plot $walls with lines linecolor rgb '#333333' linewidth 1.6, $reference using 2:3 with lines "
       "linecolor "
       "rgb '#000000' linewidth 0.5" +
       curves(flight, shown, "2:3");
   top -= path_mm + kLabel_mm;
-  script += "set size noratio\nset offsets 0, 0, graph 0.05, graph 0.05\nset autoscale xfix\n";
+  script +=
+      "set xtics autofreq\nset ytics autofreq\nset xrange [*:*] extend\nset yrange [*:*] extend\nset size "
+      "noratio\nset offsets 0, 0, "
+      "graph 0.05, graph "
+      "0.05\nset autoscale xfix\n";
   for (const auto& [axis, columns, last] : {std::tuple{"y", "1:4", false}, std::tuple{"z", "1:5", true}}) {
     script +=
         kNextPanel + sheet.axes({kLeft_mm, width_mm - kRight_mm, top - kStrip_mm, top},

@@ -1,4 +1,5 @@
 // C_T and U against height, a curve for each column of the tunnel.
+#include "analysis/conventions.h"
 #include "analysis/report/figures/tunnel_columns.h"
 
 #include <cmath>
@@ -76,9 +77,10 @@ Figures location_figures(const Material& material, double width_mm) {
   if (!material.summary)
     return {{}, {{"c_t_by_location", material.not_reduced}, {"uneven_by_location", material.not_reduced}}};
   Figures figures;
-  figures.drawn.push_back(location_figure(material, width_mm, "c_t_by_location", "C_T [–]",
-                                          &LocationSummary::c_t,
-                                          "Thrust coefficient C_T of all rotors, over ½ρΩ²R² and one disc,"));
+  figures.drawn.push_back(
+      location_figure(material, width_mm, "c_t_by_location", "C_T [–]", &LocationSummary::c_t,
+                      fmt::format("Thrust coefficient C_T of all rotors, over ½ρΩ²R² and {},",
+                                  area_in_words(material.data.info.rig))));
   if (material.data.info.rig.rotors == kMaxRotors) {
     figures.drawn.push_back(
         location_figure(material, width_mm, "uneven_by_location", "U [%]", &LocationSummary::u_percent,

@@ -127,7 +127,8 @@ function locationFigure(title, quantity, tells) {
 }
 
 const locationsSection = () => locationFigure(
-    'C_T against height', 'c_t', 'C_T is of all rotors together, over ½ρΩ²R² and one propeller disc.');
+    'C_T against height', 'c_t',
+    `C_T is of all rotors together, over ½ρΩ²R² and ${report.sections.locations.area}.`);
 const unevenSection = () => locationFigure(
     'U against height', 'u_percent',
     'U is the thrust of the right pair minus that of the left, over all four; negative rolls to the right.');

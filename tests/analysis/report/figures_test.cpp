@@ -208,6 +208,33 @@ TEST_F(DrawnFiguresTest, WhatCannotBeDrawnIsSaid) {
                                            "residual_before_after", "flights"}));
 }
 
+TEST_F(DrawnFiguresTest, TheAreaOfTheCoefficientIsSaid) {
+  test::make_campaign(db, {.raw_data = false, .open_space = false, .columns = 1, .rows = 1, .repeats = 1});
+  write(settings());
+  EXPECT_THAT(read_text(out / "captions.md"), HasSubstr("over ½ρΩ²R² and one propeller disc, against"));
+  {
+    CampaignFile file(db, CampaignFile::Access::kWrite);
+    std::string toml = file.info().toml;
+    toml.insert(toml.find('\n', toml.find("[rig]")) + 1, "rotor_area_m2 = 0.1459\n");
+    file.set_text("campaign.toml", toml);
+  }
+  write(settings());
+  EXPECT_THAT(read_text(out / "captions.md"), HasSubstr("over ½ρΩ²R² and an area of 0.1459 m², against"));
+}
+
+TEST_F(DrawnFiguresTest, PathsHaveRoomForTheLabelsOfAWideSection) {
+  test::make_campaign(db, {.raw_data = false, .columns = 1, .rows = 1});
+  nlohmann::json flights = nlohmann::json::parse(kHostileFlights);
+  flights["flights"][0]["walls"] = {{-2.25, 0}, {2.25, 0}, {2.25, 5}, {-2.25, 5}};
+  write_text(folder / "flights.json", flights.dump());
+  ReportSettings report = settings();
+  report.flights = (folder / "flights.json").string();
+  write(report, {.format = FigureFormat::kSvg});
+  const std::string drawn = read_text(out / "flight_1_paths.svg");
+  EXPECT_THAT(drawn, HasSubstr(">−2<"));
+  EXPECT_THAT(drawn, testing::Not(HasSubstr(">−1.5<")));
+}
+
 TEST_F(DrawnFiguresTest, OpenSpaceAloneAndFewerRotorsAreDrawnToo) {
   for (const test::CampaignParts& parts :
        {test::CampaignParts{.tunnel = false}, test::CampaignParts{.raw_data = false, .rotors = 1}}) {

@@ -56,9 +56,10 @@ struct Reduced {
 TEST_F(ReportTest, NumbersAreThoseOfTheReduction) {
   const Json page = json({});
   const Reduced expected(db);
-  EXPECT_EQ(
-      page["sections"]["locations"],
-      Json::parse(reduction_json(expected.data, expected.reduction, expected.summary, Convention::kThesis)));
+  Json locations =
+      Json::parse(reduction_json(expected.data, expected.reduction, expected.summary, Convention::kThesis));
+  locations["area"] = "one propeller disc";
+  EXPECT_EQ(page["sections"]["locations"], locations);
   ASSERT_EQ(page["runs"]["run"].size(), expected.data.runs.size());
   for (const RunCoefficients& run : expected.reduction.runs) {
     EXPECT_EQ(page["runs"]["run"][run.run], expected.data.runs[run.run].run);

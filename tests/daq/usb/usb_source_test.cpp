@@ -76,6 +76,12 @@ TEST(Usb, SaysWhyABoardCannotBeHad) {
   EXPECT_NE(message_of([] { open_source("usb:,rate=1/0"); }).find("rate=4000/3"), std::string::npos);
 }
 
+TEST(Usb, RefusesABoardWithoutAClock) {
+  Rig rig(Pace::kRig);
+  rig.board.core.identity.tick_hz = 0;
+  EXPECT_NE(test::message_of([] { open_source("usb"); }).find("its clock runs at 0 Hz"), std::string::npos);
+}
+
 /// Takes the right to open a board's node away; root loses it by becoming nobody for a while.
 struct NoPermission {
   explicit NoPermission(const UsbDevice& device) {

@@ -1,5 +1,6 @@
 // Whole flights: symmetry, repeatability, what a map is worth, what undeclared effects leave behind.
 #include "flight/simulation/flight_loop.h"
+#include "flight/simulation/localisation.h"
 #include "flight/simulation/monte_carlo.h"
 
 #include <cmath>
@@ -124,6 +125,24 @@ TEST_F(Flights, AnEvenlyBlownControllerWithoutGripHitsTheWallAndIsCounted) {
   ASSERT_FALSE(score.contacts.empty());
   EXPECT_GT(score.contacts[0].touched_y_m, 0.5);
   EXPECT_FALSE(std::isnan(score.rms_m()));
+}
+
+/// It is lost a moment later, where the simulation sees that it overturned: no scan may end all flights.
+TEST_F(Flights, ScansOfOneThatOverturnsAreRejected) {
+  Localisation localisation(space, {});
+  RigidState truth;
+  truth.attitude = attitude_from({0, 1.4, 0});
+  localisation.start(truth);
+  for (int cycle = 0; cycle < 50; ++cycle) {
+    EstimatorInput in;
+    in.truth = &truth;
+    in.attitude = euler_angles(truth.attitude);
+    localisation.step(in);
+  }
+  FlightScore score;
+  localisation.finish(score);
+  EXPECT_GT(score.matches, 0);
+  EXPECT_EQ(score.rejected_matches, score.matches);
 }
 
 }  // namespace
