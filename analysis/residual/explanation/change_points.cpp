@@ -1,15 +1,17 @@
-// Where a step lies.
+// Where a step lies, and what is profiled like it.
 #include "analysis/residual/explanation/explanation_parts.h"
 #include "analysis/residual/search/group_amplitudes.h"
+#include "analysis/residual/search/shape_profile.h"
 #include "analysis/residual/search/step_profile.h"
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace tunnelrig {
 
 MeanModel with_change_points_of_all(Observations& observations, MeanModel model,
-                                    std::vector<ChangePoint>& result) {
+                                    std::vector<Profiled>& result) {
   const std::vector<int> rows = observations.all_rows();
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const auto k = model.terms[t].effect->change_point();
@@ -17,10 +19,23 @@ MeanModel with_change_points_of_all(Observations& observations, MeanModel model,
     const StepProfile profile = step_profile(observations, model, t, rows);
     if (profile.empty()) continue;
     if (model.terms[t].per_group && profile.likeliest() != first_row_of(model.terms[t]))
-      model = fit_with_step_at(profile.likeliest(), observations, std::move(model), t, rows).model;
+      model = fit_with_parameter(*k, profile.likeliest(), observations, std::move(model), t, rows).model;
     model.terms[t].parameters[*k] = profile.likeliest();
     result.push_back({t, *k, static_cast<double>(profile.lowest()), static_cast<double>(profile.highest())});
   }
+  return model;
+}
+
+MeanModel with_group_shapes_of_all(Observations& observations, MeanModel model,
+                                   std::vector<Profiled>& result) {
+  const std::vector<int> rows = observations.all_rows();
+  for (std::size_t t = 0; t < model.terms.size(); ++t)
+    for (const std::size_t k : shapes_in_groups(model.terms[t])) {
+      const ShapeProfile profile =
+          shape_profile(observations, fit_in_turns(observations, model, rows), t, k, rows);
+      model = fit_with_parameter(k, profile.likeliest, observations, std::move(model), t, rows).model;
+      result.push_back({t, k, profile.low, profile.high});
+    }
   return model;
 }
 

@@ -3,6 +3,7 @@
 #include "analysis/residual/likelihood/scores.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace tunnelrig {
 namespace {
@@ -36,11 +37,11 @@ void report_adopted(const Observations& observations, const Attribution& found, 
 
 /// Change-points as the runs are numbered, where the search counted rows; where they are counted anew in
 /// each group, numbers do not say which row it is, and the rows are counted from 0.
-void number_change_points(const Observations& observations, const std::vector<ChangePoint>& change_points,
+void number_change_points(const Observations& observations, const std::vector<Profiled>& change_points,
                           Explanation& explanation) {
   const Covariate* order = observations.find("run_order");
   if (order == nullptr || !std::ranges::is_sorted(order->value.col(0))) return;
-  for (const ChangePoint& point : change_points) {
+  for (const Profiled& point : change_points) {
     ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
     for (double* place : {&estimate.value, &estimate.low, &estimate.high})
       *place = order->value(static_cast<Eigen::Index>(*place), 0);
@@ -71,9 +72,10 @@ void estimate_on_all(const Models& models, const Observations& observations,
   Attribution found = models.found;
   Observations& wide = found.observations;
   const std::vector<int> rows = observations.all_rows();
-  std::vector<ChangePoint> change_points;
-  const JointFit whole =
-      fit_jointly(wide, with_change_points_of_all(wide, found.final.model, change_points), rows);
+  std::vector<Profiled> change_points, shapes;
+  MeanModel model = with_change_points_of_all(wide, found.final.model, change_points);
+  model = with_group_shapes_of_all(wide, std::move(model), shapes);
+  const JointFit whole = fit_jointly(wide, model, rows);
   if (!whole.converged)
     explanation.warnings.emplace_back(
         "the effects could not be fitted together to all runs, since forces would change their sign: the "
@@ -84,7 +86,12 @@ void estimate_on_all(const Models& models, const Observations& observations,
   const HeldOutErrors fitted = score(wide, whole, rows, rows);
   explanation.residual_after = fitted.error;
   report_adopted(wide, found, whole, rows, explanation);
-  for (const ChangePoint& point : change_points) {
+  for (const Profiled& shape : shapes) {
+    ParameterEstimate& estimate = explanation.adopted[shape.term].parameters[shape.parameter];
+    estimate.low = shape.low;
+    estimate.high = shape.high;
+  }
+  for (const Profiled& point : change_points) {
     ParameterEstimate& estimate = explanation.adopted[point.term].parameters[point.parameter];
     estimate.low = point.low;
     estimate.high = point.high;

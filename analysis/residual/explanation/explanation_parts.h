@@ -89,8 +89,9 @@ Explanation without_names_of_incomplete(Explanation explanation, const Observati
 
 // --- change_points.cpp
 
-/// Where a step may lie as well, as far as all runs tell.
-struct ChangePoint {
+/// Where a parameter may lie as well that no jackknife moves, as far as all runs tell: the run of a step, a
+/// time constant beside amplitudes of the groups' own.
+struct Profiled {
   std::size_t term, parameter;
   double low, high;  // 95 %
 };
@@ -98,7 +99,11 @@ struct ChangePoint {
 /// Steps were sought by the open blocks; all runs tell where they lie. The columns of those with amplitudes
 /// of the groups' own are made anew there.
 MeanModel with_change_points_of_all(Observations& observations, MeanModel model,
-                                    std::vector<ChangePoint>& result);
+                                    std::vector<Profiled>& result);
+
+/// The same for the shapes of effects with amplitudes of the groups' own.
+MeanModel with_group_shapes_of_all(Observations& observations, MeanModel model,
+                                   std::vector<Profiled>& result);
 
 /// Sealed runs between the open ones on either side of a step, before or behind it: the open ones do not say
 /// which, so no model could predict them. Nothing where all are.

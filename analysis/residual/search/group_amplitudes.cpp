@@ -48,6 +48,20 @@ OwnResponse respond_in_groups(Term term, const VectorXd& amplitude, const Observ
   return result;
 }
 
+GroupTerm group_term(const Observations& observations, const JointFit& fit, const Forces& forces,
+                     std::size_t t, const std::vector<int>& rows) {
+  const Index k = place_among_own(fit.model, t);
+  GroupTerm result{
+      .by_group = amplitudes_of(observations, fit, t, rows), .amplitude = {}, .made = {}, .acted_on = {}};
+  result.amplitude = result.by_group(observations.group);
+  result.made = result.amplitude.cwiseProduct(observations.slopes.col(observations.first_own_slope() + k)) +
+                observations.beyond.col(k);
+  const VectorXd with_it = forces.acted_on[t].col(0);  // a part of the baseline
+  result.acted_on = observations.multiplicative ? VectorXd(with_it.array() / result.made.array().exp())
+                                                : VectorXd(with_it - result.made);
+  return result;
+}
+
 Index place_among_own(const MeanModel& model, std::size_t t) {
   return std::count_if(model.terms.begin(), model.terms.begin() + static_cast<std::ptrdiff_t>(t),
                        [](const Term& term) { return term.per_group; });
@@ -85,15 +99,14 @@ std::vector<Components> columns_by_group(const Components& column, const Observa
   return result;
 }
 
-JointFit fit_with_step_at(int row, Observations& observations, MeanModel model, std::size_t t,
-                          const std::vector<int>& rows) {
+JointFit fit_with_parameter(std::size_t k, double value, Observations& observations, MeanModel model,
+                            std::size_t t, const std::vector<int>& rows) {
   const MatrixXd predicted = predict_response(observations, model, rows);
-  Term& step = model.terms[t];
-  step.parameters[step.effect->change_point().value()] = row;
-  const Index k = place_among_own(model, t);
-  observations.slopes.col(observations.first_own_slope() + k) =
-      respond(step, observations, predicted).derivative[0][0];
-  observations.beyond.col(k).setZero();
+  model.terms[t].parameters[k] = value;
+  const Index own = place_among_own(model, t);
+  observations.slopes.col(observations.first_own_slope() + own) =
+      respond(model.terms[t], observations, predicted).derivative[0][0];
+  observations.beyond.col(own).setZero();
   return fit_in_turns(observations, model, rows);
 }
 
@@ -110,16 +123,12 @@ JointFit fit_in_turns(Observations& observations, const MeanModel& model, const 
     for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
       if (!fit.model.terms[t].per_group) continue;
       const Index k = place_among_own(fit.model, t);
-      const VectorXd by_group = amplitudes_of(observations, fit, t, rows);
-      const VectorXd amplitude = by_group(observations.group);
-      const VectorXd made = amplitude.cwiseProduct(slopes.col(first + k)) + beyond.col(k);
-      const VectorXd with_it = forces.acted_on[t].col(0);  // a part of the baseline
-      const VectorXd acted_on = observations.multiplicative ? VectorXd(with_it.array() / made.array().exp())
-                                                            : VectorXd(with_it - made);
-      const OwnResponse own = respond_in_groups(fit.model.terms[t], by_group, observations, acted_on);
+      const GroupTerm before = group_term(observations, fit, forces, t, rows);
+      const OwnResponse own =
+          respond_in_groups(fit.model.terms[t], before.by_group, observations, before.acted_on);
       slopes.col(first + k) = own.derivative;
-      beyond.col(k) = own.value - amplitude.cwiseProduct(own.derivative);
-      settled &= (own.value - made).norm() <= kSettled * own.value.norm();
+      beyond.col(k) = own.value - before.amplitude.cwiseProduct(own.derivative);
+      settled &= (own.value - before.made).norm() <= kSettled * own.value.norm();
     }
     if (!slopes.allFinite() || !beyond.allFinite()) break;  // a force that has changed its sign
     observations.slopes = std::move(slopes);

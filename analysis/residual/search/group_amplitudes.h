@@ -31,6 +31,14 @@ struct OwnResponse {
 OwnResponse respond_in_groups(Term term, const Eigen::VectorXd& amplitude, const Observations& observations,
                               const Eigen::MatrixXd& forces);
 
+/// What such a term acts on, and with which amplitudes (of all rows, those of their groups, within bounds).
+struct GroupTerm {
+  Eigen::VectorXd by_group;                   // of each group; 0 where it does not say
+  Eigen::VectorXd amplitude, made, acted_on;  // n
+};
+GroupTerm group_term(const Observations& observations, const JointFit& fit, const Forces& forces,
+                     std::size_t t, const std::vector<int>& rows);
+
 /// Of the columns of effects with amplitudes of the groups' own, which one is term t's: from 0.
 Eigen::Index place_among_own(const MeanModel& model, std::size_t t);
 
@@ -48,8 +56,8 @@ std::vector<Components> columns_by_group(const Components& column, const Observa
 /// they have not changed themselves: slopes and `beyond` of the observations are set to it.
 JointFit fit_in_turns(Observations& observations, const MeanModel& model, const std::vector<int>& rows);
 
-/// The same, with term t a step that begins at another row.
-JointFit fit_with_step_at(int row, Observations& observations, MeanModel model, std::size_t t,
-                          const std::vector<int>& rows);
+/// The same, with another value of parameter k of term t: a step that begins at another row.
+JointFit fit_with_parameter(std::size_t k, double value, Observations& observations, MeanModel model,
+                            std::size_t t, const std::vector<int>& rows);
 
 }  // namespace tunnelrig

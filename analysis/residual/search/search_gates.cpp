@@ -85,7 +85,8 @@ JointFit Search::at_best_run(JointFit fit, std::size_t from_newest) {
   if (profile.empty() || profile.likeliest() == first_row_of(step)) return fit;
   if (step.per_group) {
     Observations moved = observations_;
-    JointFit there = fit_with_step_at(profile.likeliest(), moved, fit.model, t, rows_);
+    JointFit there = fit_with_parameter(step.effect->change_point().value(), profile.likeliest(), moved,
+                                        fit.model, t, rows_);
     if (there.variances.log_likelihood <= fit.variances.log_likelihood) return fit;
     observations_ = std::move(moved);
     make_models();

@@ -1,6 +1,7 @@
 // An effect whose amplitude is each group's own.
 #include "analysis/residual/search/group_amplitudes.h"
 #include "analysis/residual/search/search.h"
+#include "analysis/residual/search/shape_profile.h"
 #include "calibration/distributions.h"
 
 #include <algorithm>
@@ -82,6 +83,14 @@ std::optional<double> Search::gain_of(const InGroups& own, bool before_others) c
 }
 
 void Search::take(InGroups own) {
+  const std::size_t t = own.fit.model.terms.size() - 1;
+  for (const std::size_t k : shapes_in_groups(own.fit.model.terms[t])) {
+    const double value = shape_profile(own.observations, own.fit, t, k, rows_).likeliest;
+    Observations moved = own.observations;
+    JointFit there = fit_with_parameter(k, value, moved, own.fit.model, t, rows_);
+    if (there.variances.log_likelihood > own.fit.variances.log_likelihood)
+      own = {std::move(moved), std::move(there)};
+  }
   observations_ = std::move(own.observations);
   make_models();
   fit_ = at_best_run(std::move(own.fit), 1);

@@ -55,6 +55,34 @@ TEST_F(TablesTest, DriftsOfEitherSignAreFoundInEachGroup) {
   }
 }
 
+/// A time constant that groups share beside amplitudes of their own has an interval, and it holds the truth.
+TEST_F(TablesTest, ATimeConstantBesideAmplitudesOfGroupsIsEstimated) {
+  constexpr std::array<double, 4> kCreep = {0.01, 0.04, 0.1, 0.16};
+  constexpr double kTau_s = 20;
+  std::string csv = "cell,day,t,u\n";
+  for (int day = 0; day < 24; ++day)
+    for (std::size_t cell = 0; cell < kCreep.size(); ++cell)
+      for (int k = 0; k < 3; ++k) {
+        const double t = 120 * even(random);
+        csv +=
+            fmt::format("{},{},{},{}\n", cell, day, t,
+                        (5 + static_cast<double>(cell)) * (1 + kCreep[cell] * (1 - std::exp(-t / kTau_s))) *
+                            (1 + 0.002 * scatter(random)));
+      }
+  const Explanation e = explained(
+      observed(csv,
+               "groups = [\"cell\"]\nblocks = \"day\"\n[response]\ncolumn = \"u\"\nunit = \"N\"\n"
+               "[[covariates]]\ncolumn = \"t\"\nunit = \"s\"\nmeaning = \"time_since_motor_start_s\"\n"));
+  ASSERT_EQ(names(e), "creep ");
+  ASSERT_TRUE(e.adopted[0].term.per_group);
+  const ParameterEstimate& tau = e.adopted[0].parameters[1];
+  EXPECT_NEAR(tau.value, kTau_s, 1.5);
+  EXPECT_LT(tau.low, kTau_s);
+  EXPECT_GT(tau.high, kTau_s);
+  EXPECT_GT(tau.high - tau.low, 0.5);
+  EXPECT_LT(tau.high - tau.low, 5);
+}
+
 TEST_F(TablesTest, GroupsWithExponentsOfTheirOwnAreTold) {
   std::string csv = "p,V,y\n";
   for (int r = 0; r < 80; ++r) {
