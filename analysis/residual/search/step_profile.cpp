@@ -58,26 +58,35 @@ StepProfile step_profile(const Observations& given, const MeanModel& model, std:
   std::optional<Observations> fewer;
   if (step.per_group) fewer = without_own(given, model, t);
   const Observations& observations = fewer ? *fewer : given;
-  const std::vector<int> groups = groups_among(observations, rows);
   const MeanModel rest = model.without_term(t);
   const Forces forces = predict_forces(observations, rest, rows);
   const LinearModel linear = linearise(observations, rest, forces);
   const Components y = difference(response_components(observations), linear.offset);
+  const auto column_from = [&](int row) {
+    step.parameters[step.effect->change_point().value()] = row;
+    return respond(step, observations, forces.predicted).derivative[0];
+  };
   const MixedModel mixed(observations, rows);
-  const auto evaluate = [&](auto first, auto last) {
+  const auto alike = [&](auto first, auto last) {
     std::vector<Candidate> candidates;
-    for (auto row = first; row != last; ++row) {
-      step.parameters[step.effect->change_point().value()] = *row;
-      Components column = respond(step, observations, forces.predicted).derivative[0];
-      if (step.per_group)
-        candidates.push_back({.columns = columns_by_group(column, observations, groups, mixed)});
-      else
-        candidates.push_back({.columns = {std::move(column)}});
-    }
+    for (auto row = first; row != last; ++row) candidates.push_back({.columns = {column_from(*row)}});
     std::vector<double> result;
     for (const CandidateFit& fit : CandidateScan(mixed, linear.columns, candidates).fit(y))
       result.push_back(fit.likelihood_ratio);
     return result;
+  };
+  Observations wide =
+      given;  // there may be more groups than a candidate has columns: it stands in the baseline
+  const auto in_groups = [&](auto first, auto last) {
+    std::vector<double> result;
+    for (auto row = first; row != last; ++row) {
+      wide.slopes.col(given.first_own_slope() + place_among_own(model, t)) = column_from(*row)[0];
+      result.push_back(CandidateScan(MixedModel(wide, rows), linear.columns, {}).null_fit(y).log_likelihood);
+    }
+    return result;
+  };
+  const auto evaluate = [&](auto first, auto last) {
+    return step.per_group ? in_groups(first, last) : alike(first, last);
   };
   auto from = std::lower_bound(possible.begin(), possible.end(), first_row_of(model.terms[t]));
   auto to = from;

@@ -203,5 +203,26 @@ TEST_F(Steps, InALongTableAreFoundWhereTheyAre) {
   }
 }
 
+/// More groups than a candidate has columns, each with a step of its own.
+TEST_F(Steps, OfAHundredGroupsAreFound) {
+  constexpr int kGroups = 100, kFirst = 7 * kGroups;
+  std::vector<double> size;
+  for (int g = 0; g < kGroups; ++g) size.push_back(0.03 + 0.02 * scatter(random));
+  std::string csv = "g,b,n,u\n";
+  for (int n = 0; n < 14 * kGroups; ++n) {
+    const int g = n % kGroups;
+    const double force_N = (2 + 0.1 * g) * (1 + (n >= kFirst ? size[static_cast<std::size_t>(g)] : 0.0));
+    csv += fmt::format("g{},{},{},{}\n", g, n / kGroups, n, force_N * (1 + 0.004 * scatter(random)));
+  }
+  const Explanation e = explained(observed(csv,
+                                           "groups = [\"g\"]\nblocks = \"b\"\n[response]\ncolumn = \"u\"\n"
+                                           "unit = \"N\"\n[[covariates]]\ncolumn = \"n\"\nunit = \"1\"\n"
+                                           "meaning = \"run_order\"\n"));
+  ASSERT_EQ(e.adopted.size(), 1u) << names(e);
+  ASSERT_TRUE(e.adopted[0].term.per_group);
+  EXPECT_NEAR(first_row_of(e.adopted[0].term), kFirst, 3);
+  EXPECT_NEAR(e.adopted[0].parameters[0].value, 0.03, 0.01);
+}
+
 }  // namespace
 }  // namespace tunnelrig
