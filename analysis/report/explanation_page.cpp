@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <set>
 
@@ -32,7 +33,8 @@ std::vector<double> sizes_of(const VectorXd& values) {
 
 /// As many digits as a picture shows; what is not known is null.
 Json drawn(double value) {
-  return std::isfinite(value) ? Json(std::stod(fmt::format("{:.6g}", value))) : Json(nullptr);
+  return std::isfinite(value) ? Json(std::strtod(fmt::format("{:.6g}", value).c_str(), nullptr))
+                              : Json(nullptr);
 }
 
 Json drawn(const std::vector<double>& values) {

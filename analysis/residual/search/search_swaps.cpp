@@ -57,10 +57,10 @@ bool Search::change_a_form() {
     if (old.per_group || std::ranges::none_of(ways_, other)) continue;
     const JointFit without = fit_without(t);
     const Scan scan = scan_effects(without);
-    std::map<const Effect*, std::size_t> best;  // way of each form
+    std::map<std::string, std::size_t> best;  // way of each form
     for (const std::size_t i : scan.order)
-      if (other(scan.ways[i])) best.emplace(scan.ways[i].effect, i);
-    for (const auto& [effect, i] : best) {
+      if (other(scan.ways[i])) best.emplace(scan.ways[i].effect->form, i);
+    for (const auto& [form, i] : best) {
       const JointFit tried = fit_beside(without, scan, i);
       if (!(worth(tried) > worth(fit_)) || !tried.at_bound.empty()) continue;
       put_in_place(t, without, tried, maxima_of(without, scan, ++salt_).p(scan.fits[i].evidence));

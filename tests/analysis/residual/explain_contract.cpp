@@ -1,7 +1,11 @@
 #include "analysis/residual/explain_contract.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <initializer_list>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -12,12 +16,37 @@ using nlohmann::json;
 
 namespace {
 
-void expect_finite(const json& value, const std::string& path) {
-  if (value.is_number()) {
-    EXPECT_TRUE(std::isfinite(value.get<double>())) << path;
+/// JSON has no NaN: one is written as null, which only what need not be there may be.
+void expect_no_unknown_null(const json& value, const std::string& path) {
+  constexpr std::array<std::string_view, 5> kMayBeNull = {"rotor", "from_rotor", "separating_run", "place",
+                                                          "times"};
+  for (const auto& [key, inner] : value.items()) {
+    const std::string place = fmt::format("{}/{}", path, key);
+    EXPECT_TRUE(!inner.is_null() || std::ranges::count(kMayBeNull, key) > 0) << place;
+    if (inner.is_structured()) expect_no_unknown_null(inner, place);
   }
-  if (value.is_object() || value.is_array())
-    for (const auto& [key, inner] : value.items()) expect_finite(inner, fmt::format("{}/{}", path, key));
+}
+
+/// What is written is 0 where a number is not finite: the numbers themselves are looked at.
+void expect_finite(const Explanation& e) {
+  const auto is_finite = [](std::initializer_list<double> numbers) {
+    return std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
+  };
+  EXPECT_TRUE(is_finite({e.noise_floor, e.detectable}));
+  for (const ErrorEstimate& error : {e.before, e.after})
+    EXPECT_TRUE(is_finite({error.rmse, error.held_out_rmse, error.held_out_low, error.held_out_high}));
+  for (const auto& [name, size] : e.detectable_by_effect) EXPECT_TRUE(std::isfinite(size)) << name;
+  for (const AdoptedEffect& adopted : e.adopted) {
+    EXPECT_TRUE(is_finite({adopted.p_value, adopted.held_out_gain})) << adopted.term.label();
+    for (const ParameterEstimate& parameter : adopted.parameters)
+      EXPECT_TRUE(is_finite({parameter.value, parameter.low, parameter.high})) << parameter.name;
+  }
+  for (const UnknownStructure& unknown : e.unknown) {
+    EXPECT_TRUE(is_finite({unknown.p_value, unknown.amplitude})) << unknown.covariate;
+    for (const ShapePoint& point : unknown.shape)
+      EXPECT_TRUE(is_finite({point.x, point.y, point.low, point.high})) << unknown.covariate;
+  }
+  for (const SuspectRow& row : e.suspect_rows) EXPECT_TRUE(std::isfinite(row.studentised)) << row.row;
 }
 
 }  // namespace
@@ -63,7 +92,8 @@ void expect_contract(const Explanation& explanation) {
     EXPECT_TRUE(row.contains("set_aside"));
   }
   EXPECT_GT(written["noise_floor"], 0);
-  expect_finite(written, "");
+  expect_no_unknown_null(written, "");
+  expect_finite(explanation);
 }
 
 }  // namespace tunnelrig::test
