@@ -94,23 +94,6 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
   return explanation;
 }
 
-/// What all runs say against a name that the open ones had let in; empty: nothing. Theory's coefficient is
-/// not the data's to refute.
-std::string refutation(const AdoptedEffect& adopted, const Observations& observations) {
-  if (adopted.term.effect->theory_only || adopted.term.at_theory) return "";
-  const ParameterEstimate& amplitude = adopted.parameters[0];
-  if (adopted.at_bound) return fmt::format("its {} is at its physical bound", amplitude.name);
-  if (adopted.anywhere) return "when it happened is not known within half of the runs";
-  if (adopted.bends_away)
-    return fmt::format("what goes with {} bends away from its formula",
-                       fmt::join(own_conditions(*adopted.term.effect, observations), ", "));
-  const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
-  // Where groups have their own, these may be of either sign, and nothing on the whole.
-  const bool nothing =
-      adopted.term.per_group ? std::ranges::all_of(amplitude.groups, holds_0) : holds_0(amplitude);
-  return nothing ? fmt::format("the 95 % interval of its {} holds 0", amplitude.name) : "";
-}
-
 /// What the opened seal refutes: single names, or all of them, since which is wrong is not known, and another
 /// for the same would be chosen by the seal.
 struct Refuted {
@@ -232,6 +215,27 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
 }
 
 }  // namespace
+
+std::string refutation(const AdoptedEffect& adopted, const Observations& observations) {
+  if (adopted.term.effect->theory_only || adopted.term.at_theory) return "";
+  const ParameterEstimate& amplitude = adopted.parameters[0];
+  if (adopted.at_bound) return fmt::format("its {} is at its physical bound", amplitude.name);
+  if (adopted.anywhere) return "when it happened is not known within half of the runs";
+  for (std::size_t k = 1; k < adopted.parameters.size(); ++k) {
+    const EffectParameter& bounds = adopted.term.effect->parameters[k];
+    const ParameterEstimate& shape = adopted.parameters[k];
+    if (bounds.role == ParameterRole::kShape && shape.low <= bounds.lower && shape.high >= bounds.upper)
+      return fmt::format("its {} may be anything within its bounds", shape.name);
+  }
+  if (adopted.bends_away)
+    return fmt::format("what goes with {} bends away from its formula",
+                       fmt::join(own_conditions(*adopted.term.effect, observations), ", "));
+  const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
+  // Where groups have their own, these may be of either sign, and nothing on the whole.
+  const bool nothing =
+      adopted.term.per_group ? std::ranges::all_of(amplitude.groups, holds_0) : holds_0(amplitude);
+  return nothing ? fmt::format("the 95 % interval of its {} holds 0", amplitude.name) : "";
+}
 
 Observations without_set_aside(const Observations& observations, const Explanation& explanation) {
   std::vector<SuspectRow> aside;

@@ -53,6 +53,10 @@ void warn_of_scatter(const Observations& observations, Explanation& explanation)
 /// Candidates that would be named, were it not for their physical bounds.
 void warn_of_bounds(const Observations& observations, const Attribution& found, Explanation& explanation);
 
+/// What all runs say against a name that the open ones had let in; empty: nothing. Theory's coefficient is
+/// not the data's to refute. (explain.cpp)
+std::string refutation(const AdoptedEffect& adopted, const Observations& observations);
+
 /// Of two errors of the sealed blocks: by more than chance may do.
 inline bool is_worse(double error, double than) { return error > 1.1 * than; }
 

@@ -199,5 +199,23 @@ TEST(Twins, WhichTakeEachOthersPlaceAreBothSaid) {
   EXPECT_GE(named, 12);
 }
 
+/// With a time constant that may be anything the formula says nothing.
+TEST_F(Refuted, ANameOfWhichTheTimeConstantIsNotKnownIsNone) {
+  const Observations o = test::four_rotors(3, 0.002, random);
+  const Effect& creep = test::effect_named("creep");
+  const EffectParameter& bounds = creep.parameters[1];
+  const auto with_interval = [&](double low, double high) {
+    return AdoptedEffect{.term = {.effect = &creep, .parameters = {0.02, 100}},
+                         .parameters = {{.name = "amplitude", .value = 0.02, .low = 0.01, .high = 0.03},
+                                        {.name = "time_constant", .value = 100, .low = low, .high = high}},
+                         .confounded_with = {},
+                         .separating_run = {}};
+  };
+  EXPECT_EQ(refutation(with_interval(20, bounds.upper), o), "");
+  EXPECT_EQ(refutation(with_interval(bounds.lower, 300), o), "");
+  EXPECT_THAT(refutation(with_interval(bounds.lower, bounds.upper), o),
+              HasSubstr("time_constant may be anything"));
+}
+
 }  // namespace
 }  // namespace tunnelrig
