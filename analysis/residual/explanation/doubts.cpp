@@ -49,9 +49,9 @@ void warn_of_doubts(Explanation& explanation) {
   }
   if (explanation.noise_floor > explanation.after.held_out_high)
     explanation.warnings.emplace_back(
-        "the noise floor is above all of the error's interval: the rows scatter less evenly than its "
-        "variances "
-        "can follow (or the sealed blocks are calm by chance), so that it is too high");
+        "the noise floor is above all of the error's interval: the sealed blocks are calm by chance (in one "
+        "campaign of twenty-five without any fault), or the rows scatter less evenly than its variances can "
+        "follow, and it is too high");
   const bool worse = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
   if (const SealedErrors& sealed = explanation.sealed;
       worse && sealed.all < std::min(sealed.curves, explanation.before.held_out_rmse))
