@@ -47,6 +47,7 @@ void board_start(rig_board* b, bool pattern) {
   if (b->running) return;
   b->pattern = pattern;
   b->running = true;
+  b->pending_status = 0; /* of the last run */
   decimator_reset(&b->filter);
   uint32_t ticks_per_scan = b->rate.ticks_per_frame / b->rate.oversampling;
   b->origin_sequence = b->sequence;
