@@ -11,7 +11,8 @@ static void on_halted(void* context, bool on);
 static const usb_application kApplication = {commands_in, commands_out, on_configured, on_sent, on_halted};
 
 void board_init(rig_board* b, const board_port* port, void* port_context, const usb_controller* controller,
-                void* controller_context, const trw_identity* identity, uint32_t highest_rate_hz) {
+                void* controller_context, const trw_identity* identity, uint32_t highest_rate_hz,
+                uint32_t scan_ticks) {
   memset(b, 0, sizeof *b);
   b->port = port;
   b->port_context = port_context;
@@ -19,6 +20,7 @@ void board_init(rig_board* b, const board_port* port, void* port_context, const 
   b->identity.protocol = TRW_USB_PROTOCOL;
   b->identity.ring_frames = BOARD_RING_FRAMES;
   b->highest_rate_hz = highest_rate_hz;
+  b->scan_ticks = scan_ticks;
   ring_init(&b->ring, b->slots, BOARD_RING_FRAMES);
   const trw_rate_wish wish = {kDefaultNumerator_hz, kDefaultDenominator, 1};
   (void)board_set_rate(b, &wish);
@@ -28,7 +30,8 @@ void board_init(rig_board* b, const board_port* port, void* port_context, const 
 /* --- commands
  * --------------------------------------------------------------------------------------------------- */
 
-/* Only a whole number of ticks is exact, and with oversampling a whole number per scan. */
+/* Only a whole number of ticks is exact, and with oversampling a whole number per scan. A scan that is asked
+ * for while the last one is under way would not come. */
 bool board_set_rate(rig_board* b, const trw_rate_wish* wish) {
   if (b->running || wish->numerator_hz == 0 || wish->denominator == 0) return false;
   if (wish->oversampling != 1 && wish->oversampling != DECIMATION) return false;
@@ -37,6 +40,7 @@ bool board_set_rate(rig_board* b, const trw_rate_wish* wish) {
   if (dividend % wish->numerator_hz != 0 || ticks > UINT32_MAX || ticks % wish->oversampling != 0)
     return false;
   if (ticks * b->highest_rate_hz < b->identity.tick_hz) return false;
+  if (ticks / wish->oversampling < b->scan_ticks) return false;
   b->rate = (trw_rate){b->identity.tick_hz, (uint32_t)ticks, wish->oversampling};
   uint64_t frames = (uint64_t)b->identity.tick_hz * BOARD_PACKET_MS / (1000u * ticks);
   b->packet_frames = frames == 0 ? 1u : frames > BOARD_PACKET_FRAMES ? BOARD_PACKET_FRAMES : (uint32_t)frames;

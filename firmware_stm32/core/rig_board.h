@@ -41,6 +41,7 @@ typedef struct {
   /* written by commands, read by the sampling interrupt while it runs */
   trw_rate rate;
   uint32_t highest_rate_hz; /* of frames: what the stream carries */
+  uint32_t scan_ticks;      /* of the clock: what the converter needs for one scan */
   uint32_t packet_frames;
   bool running, pattern;
   uint32_t stops; /* how often it was stopped */
@@ -75,9 +76,10 @@ typedef struct {
 } rig_board;
 
 /* `identity` without describe and fault record is filled in later by the caller, before the bus is connected.
- */
+ * Rates above `highest_rate_hz`, or with less than `scan_ticks` of tick_hz from scan to scan, are refused. */
 void board_init(rig_board* b, const board_port* port, void* port_context, const usb_controller* controller,
-                void* controller_context, const trw_identity* identity, uint32_t highest_rate_hz);
+                void* controller_context, const trw_identity* identity, uint32_t highest_rate_hz,
+                uint32_t scan_ticks);
 
 /* Sampling interrupt: the scans of one frame (rate.oversampling x TRW_CHANNELS conversions). */
 void board_on_scans(rig_board* b, const uint16_t* scans);

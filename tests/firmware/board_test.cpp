@@ -277,6 +277,12 @@ TEST(FirmwareBoard, RatesAreThoseTheTimerMakesExactly) {
   EXPECT_EQ(set_rate(board, 1, 0, 1), kStall);
   EXPECT_EQ(set_rate(board, 12000, 1, 1), kStall) << "more than the stream carries";
   EXPECT_EQ(set_rate(board, 4000000000u, 1, 1), kStall);
+  EXPECT_EQ(set_rate(board, 10000, 1, 1), 0) << "the fastest";
+  for (const std::uint32_t rate_hz : {7000u, 7500u, 8000u, 10000u})
+    EXPECT_EQ(set_rate(board, rate_hz, 1, 8), kStall) << "a scan takes 18.4 us";
+  EXPECT_EQ(set_rate(board, 84000000, 8 * 1547, 8), kStall);
+  EXPECT_EQ(set_rate(board, 84000000, 8 * 1548, 8), 0) << "6782.9 Hz, the fastest with the filter";
+  EXPECT_EQ(set_rate(board, 1000, 1, 1), 0);
   vendor_out(board, TRW_USB_START);
   EXPECT_EQ(set_rate(board, 2000, 1, 1), kStall) << "not while running";
   EXPECT_EQ(rate(board).ticks_per_frame, 84000u);

@@ -158,7 +158,7 @@ class SamplingRuns : public testing::Test {
              .reboot_to_loader = [](void*) {}};
     trw_identity identity{};
     identity.tick_hz = 84000000;
-    board_init(&core, &port_, nullptr, &otg_fs, nullptr, &identity, 10000);
+    board_init(&core, &port_, nullptr, &otg_fs, nullptr, &identity, 10000, SAMPLING_SCAN_TICKS);
     sampling_init();
   }
   void on_sampling() {
@@ -250,7 +250,7 @@ class OtgFs : public testing::Test {
     port_ = port;
     trw_identity identity{};
     identity.tick_hz = 84000000;
-    board_init(&core, &port_, nullptr, &otg_fs, nullptr, &identity, 10000);
+    board_init(&core, &port_, nullptr, &otg_fs, nullptr, &identity, 10000, SAMPLING_SCAN_TICKS);
   }
   std::vector<std::uint8_t> control_in(const std::vector<std::uint8_t>& packet) {
     host->setup(packet);
