@@ -24,7 +24,7 @@ def bounds(conversions, priming):
     return {
         "on_sampling": (2, {}),
         "sampling_take": (0, {}),
-        "board_on_scans": (4, {0: 4 * conversions}),  # clipped()
+        "board_on_scans": (5, {0: 4 * conversions, 1: 4}),  # clipped(), and the shifts of clipped_in_filter()
         # store: 4 channels, 8 scans; the same for all 12 blocks when it is primed; then 4 channels, 12 blocks, 4 roundings
         "decimator_step": (8, {0: 4, 1: 8, 2: 4, 3: 8, 4: 12 * priming, 5: 4, 6: 12, 7: 4}),
         # consecutive(); samples and frames of trw_put_frame; bytes of the checksum

@@ -53,6 +53,7 @@ typedef struct {
   uint16_t pending_status; /* bits for the next frame that is kept */
   uint32_t ring_peak, overruns, adc_errors, isr_cycles;
   decimator filter;
+  uint64_t clipped_blocks; /* of the blocks in the filter, newest lowest: a bit for each channel */
 
   frame_ring ring;
   ring_slot slots[BOARD_RING_FRAMES];
@@ -87,7 +88,8 @@ void board_on_scans(rig_board* b, const uint16_t* scans);
 /* Frames of time between the last one and `now_ticks` of the device clock, which no sample was taken for. */
 uint32_t board_frames_missed(const rig_board* b, uint64_t now_ticks);
 
-/* Sampling interrupt: a converter or DMA error; `frames_missed` frames of time went by unsampled. */
+/* Sampling interrupt: a converter or DMA error; `frames_missed` frames of time went by unsampled. The filter
+ * begins anew, as at a start. */
 void board_on_adc_error(rig_board* b, uint32_t frames_missed);
 
 /* Main loop: sends what there is to send. */
