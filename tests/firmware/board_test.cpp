@@ -230,6 +230,7 @@ TEST(FirmwareBoard, ConverterErrorsAreTimeThatIsMissing) {
   host.drain();
   ASSERT_EQ(host.gaps.size(), 1u);
   EXPECT_EQ(host.gaps[0].frames_lost, 5u);
+  EXPECT_EQ(host.gaps[0].cause, "adc-error");
   EXPECT_EQ(host.tracker.ledger().frames_adc_error, 1u);
   EXPECT_EQ(statistics(board).adc_errors, 1u);
 }
