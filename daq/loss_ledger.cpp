@@ -29,6 +29,12 @@ std::uint16_t status_of(const Packet& packet, std::size_t index) {
   return trw_get16(frame_at(packet, index) + 2 * TRW_CHANNELS);
 }
 
+/// What the board says of the frames before one with this status; null where it says nothing.
+const char* cause_of(std::uint16_t status) {
+  if ((status & TRW_STATUS_OVERRUN) != 0) return "overrun";
+  return (status & TRW_STATUS_ADC_ERROR) != 0 ? "adc-error" : nullptr;
+}
+
 double rate_of(const trw_header& header) {
   return header.ticks_per_frame == 0 ? 0.0 : static_cast<double>(header.tick_hz) / header.ticks_per_frame;
 }
@@ -135,11 +141,11 @@ void LossTracker::take(const Packet& packet, double time_s, FrameSink& sink) {
     known = static_cast<std::size_t>(std::min<std::uint64_t>(next_sequence_ - first, header.frame_count));
     drop(first, known);
   } else if (first > next_sequence_) {
-    const bool overrun = (status_of(packet, 0) & TRW_STATUS_OVERRUN) != 0;
+    const char* told = cause_of(status_of(packet, 0));
     lost_ranges_.emplace_back(next_sequence_, first);
     forget_oldest();
     const char* unknown = noted_cause_ != nullptr ? noted_cause_ : "lost";
-    lose(first - next_sequence_, overrun ? "overrun" : unknown, false, sink);
+    lose(first - next_sequence_, told != nullptr ? told : unknown, false, sink);
   }
   if (known < header.frame_count) {
     pass(packet, known, header.frame_count - known, sink);

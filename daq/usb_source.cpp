@@ -161,7 +161,7 @@ class UsbSource : public PacketSource {
     if (board_->set_rate(wish)) return true;
     why = fmt::format(
         "the board refuses {}/{} Hz with {} conversions per frame; its clock of {} Hz must make the rate "
-        "exactly",
+        "exactly, and its converter keep up",
         wish.numerator_hz, wish.denominator, wish.oversampling, now->tick_hz);
     return false;
   }

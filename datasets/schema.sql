@@ -52,7 +52,7 @@ CREATE TABLE gaps (
   raw_run     INTEGER NOT NULL REFERENCES raw_runs (id) ON DELETE CASCADE,
   first_frame INTEGER NOT NULL,             -- index of the first stored frame after the gap
   frames_lost INTEGER NOT NULL CHECK (frames_lost > 0),
-  cause       TEXT NOT NULL DEFAULT '',     -- lost, overrun, reboot, unplugged, silent, usb-…; empty: imported without one
+  cause       TEXT NOT NULL DEFAULT '',     -- lost, overrun, adc-error, reboot, unplugged, silent, usb-…; empty: imported without one
   estimated   INTEGER NOT NULL DEFAULT 0    -- 1: the length comes from a clock
 );
 CREATE INDEX gaps_by_run ON gaps (raw_run);

@@ -23,8 +23,8 @@ FRAMES, WORDS, USB_PACKETS = 16, 16, 4
 def bounds(conversions, priming):
     return {
         "on_sampling": (2, {}),
-        "sampling_take": (1, {}),
-        "board_on_scans": (4, {0: 4 * conversions}),  # clipped()
+        "sampling_take": (0, {}),
+        "board_on_scans": (5, {0: 4 * conversions, 1: 4}),  # clipped(), and the shifts of clipped_in_filter()
         # store: 4 channels, 8 scans; the same for all 12 blocks when it is primed; then 4 channels, 12 blocks, 4 roundings
         "decimator_step": (8, {0: 4, 1: 8, 2: 4, 3: 8, 4: 12 * priming, 5: 4, 6: 12, 7: 4}),
         # consecutive(); samples and frames of trw_put_frame; bytes of the checksum
@@ -36,7 +36,7 @@ def bounds(conversions, priming):
 
 
 # Calls on the error path only: a converter overrun, which the manual's cure makes slow and which no frame depends on.
-ERROR_PATH = {"start_dma.isra.0", "board_frames_missed", "board_on_adc_error", "ticks", "__aeabi_uldivmod"}
+ERROR_PATH = {"start_anew", "board_frames_missed", "board_on_adc_error", "ticks", "__aeabi_uldivmod"}
 EXCEPTION = 12 + 12 + 2 * FLASH_REFILL  # entry and return
 
 

@@ -92,7 +92,7 @@ int main(void) {
   WR(USART1_CR1, BIT(13) | BIT(3) | BIT(2));
   const trw_identity id = {
       .firmware = 0x0100, .boot_id = 0x454D5531u, .tick_hz = kCpu_hz, .variant = TRW_VARIANT_EMULATOR};
-  board_init(&instrument, &port, NULL, &no_usb, NULL, &id, 10000);
+  board_init(&instrument, &port, NULL, &no_usb, NULL, &id, 10000, 0);
   board_start(&instrument, false);
   static uint8_t packet[TRW_MAX_PACKET];
   for (;;) {

@@ -207,7 +207,7 @@ int main(void) {
   SET(GPIOC + GPIO_MODER, BIT(2 * kLed));
   trw_identity id = identity(fault);
   survived.magic = 0;
-  board_init(&instrument, &port, NULL, &otg_fs, NULL, &id, kHighestRate_hz);
+  board_init(&instrument, &port, NULL, &otg_fs, NULL, &id, kHighestRate_hz, SAMPLING_SCAN_TICKS);
   sampling_init();
   enable_interrupts();
   usb_works = fault == CLOCK_GOOD && otg_fs_init(&instrument.usb);

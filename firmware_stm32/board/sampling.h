@@ -5,7 +5,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { SAMPLING_CHANNELS = 4, SAMPLING_MOST_SCANS = 8 };
+enum {
+  SAMPLING_CHANNELS = 4,
+  SAMPLING_MOST_SCANS = 8,
+  /* Of 84 MHz, from trigger to trigger: 84 + 12 of the converter's cycles a channel, and up to 3 until it
+   * heeds the trigger (data sheet, table 67). */
+  SAMPLING_SCAN_TICKS = 4 * (SAMPLING_CHANNELS * (84 + 12) + 3)
+};
 
 /* Clocks, pins, converter; once. */
 void sampling_init(void);

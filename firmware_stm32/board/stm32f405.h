@@ -66,7 +66,7 @@ void model_write(uint32_t address, uint32_t value);
 /* DMA2 stream 0, 10.5; ADC1 is its channel 0 (table 43) */
 #define DMA2_LISR 0x40026400u /* FEIF0 0, DMEIF0 2, TEIF0 3, HTIF0 4, TCIF0 5 */
 #define DMA2_LIFCR 0x40026408u
-#define DMA2_S0CR 0x40026410u
+#define DMA2_S0CR 0x40026410u /* EN 0, DMEIE 1, TEIE 2, TCIE 4, CT 19 */
 #define DMA2_S0NDTR 0x40026414u
 #define DMA2_S0PAR 0x40026418u
 #define DMA2_S0M0AR 0x4002641Cu
@@ -124,6 +124,7 @@ void model_write(uint32_t address, uint32_t value);
 #define SYST_RVR 0xE000E014u
 #define SYST_CVR 0xE000E018u
 #define NVIC_ISER(n) (0xE000E100u + 4u * (n))
+#define NVIC_ICPR(n) (0xE000E280u + 4u * (n))
 #define NVIC_IPR(n) (0xE000E400u + 4u * (n))
 #define SCB_AIRCR 0xE000ED0Cu
 #define SCB_SHPR3 0xE000ED20u

@@ -11,7 +11,8 @@ static void on_halted(void* context, bool on);
 static const usb_application kApplication = {commands_in, commands_out, on_configured, on_sent, on_halted};
 
 void board_init(rig_board* b, const board_port* port, void* port_context, const usb_controller* controller,
-                void* controller_context, const trw_identity* identity, uint32_t highest_rate_hz) {
+                void* controller_context, const trw_identity* identity, uint32_t highest_rate_hz,
+                uint32_t scan_ticks) {
   memset(b, 0, sizeof *b);
   b->port = port;
   b->port_context = port_context;
@@ -19,6 +20,7 @@ void board_init(rig_board* b, const board_port* port, void* port_context, const 
   b->identity.protocol = TRW_USB_PROTOCOL;
   b->identity.ring_frames = BOARD_RING_FRAMES;
   b->highest_rate_hz = highest_rate_hz;
+  b->scan_ticks = scan_ticks;
   ring_init(&b->ring, b->slots, BOARD_RING_FRAMES);
   const trw_rate_wish wish = {kDefaultNumerator_hz, kDefaultDenominator, 1};
   (void)board_set_rate(b, &wish);
@@ -28,7 +30,8 @@ void board_init(rig_board* b, const board_port* port, void* port_context, const 
 /* --- commands
  * --------------------------------------------------------------------------------------------------- */
 
-/* Only a whole number of ticks is exact, and with oversampling a whole number per scan. */
+/* Only a whole number of ticks is exact, and with oversampling a whole number per scan. A scan that is asked
+ * for while the last one is under way would not come. */
 bool board_set_rate(rig_board* b, const trw_rate_wish* wish) {
   if (b->running || wish->numerator_hz == 0 || wish->denominator == 0) return false;
   if (wish->oversampling != 1 && wish->oversampling != DECIMATION) return false;
@@ -37,17 +40,24 @@ bool board_set_rate(rig_board* b, const trw_rate_wish* wish) {
   if (dividend % wish->numerator_hz != 0 || ticks > UINT32_MAX || ticks % wish->oversampling != 0)
     return false;
   if (ticks * b->highest_rate_hz < b->identity.tick_hz) return false;
+  if (ticks / wish->oversampling < b->scan_ticks) return false;
   b->rate = (trw_rate){b->identity.tick_hz, (uint32_t)ticks, wish->oversampling};
   uint64_t frames = (uint64_t)b->identity.tick_hz * BOARD_PACKET_MS / (1000u * ticks);
   b->packet_frames = frames == 0 ? 1u : frames > BOARD_PACKET_FRAMES ? BOARD_PACKET_FRAMES : (uint32_t)frames;
   return true;
 }
 
+static void reset_filter(rig_board* b) {
+  decimator_reset(&b->filter);
+  b->clipped_blocks = 0;
+}
+
 void board_start(rig_board* b, bool pattern) {
   if (b->running) return;
   b->pattern = pattern;
   b->running = true;
-  decimator_reset(&b->filter);
+  b->pending_status = 0; /* of the last run */
+  reset_filter(b);
   uint32_t ticks_per_scan = b->rate.ticks_per_frame / b->rate.oversampling;
   b->origin_sequence = b->sequence;
   b->origin_ticks = b->port->ticks(b->port_context) + b->rate.ticks_per_frame;
@@ -78,6 +88,15 @@ static uint16_t clipped(const uint16_t* scans, uint32_t conversions) {
   return (uint16_t)bits;
 }
 
+/* A block that was clipped is in as many frames as the filter is blocks long. */
+static uint16_t clipped_in_filter(rig_board* b, uint16_t now) {
+  const uint64_t memory = (UINT64_C(1) << (TRW_CHANNELS * DECIMATOR_BLOCKS)) - 1u;
+  b->clipped_blocks = (b->clipped_blocks << TRW_CHANNELS | now) & memory;
+  uint64_t any = b->clipped_blocks;
+  for (uint32_t shift = 32; shift >= TRW_CHANNELS; shift /= 2) any |= any >> shift;
+  return (uint16_t)(any & TRW_STATUS_CLIPPED_MASK);
+}
+
 static void fill_frame(rig_board* b, const uint16_t* scans, trw_frame* frame) {
   frame->status = b->pending_status;
   if (b->pattern) {
@@ -85,12 +104,14 @@ static void fill_frame(rig_board* b, const uint16_t* scans, trw_frame* frame) {
     frame->status = (uint16_t)(frame->status | TRW_STATUS_TEST_PATTERN);
     return;
   }
-  frame->status = (uint16_t)(frame->status | clipped(scans, b->rate.oversampling * TRW_CHANNELS));
+  uint16_t bits = clipped(scans, b->rate.oversampling * TRW_CHANNELS);
   if (b->rate.oversampling == 1) {
     for (uint32_t c = 0; c < TRW_CHANNELS; ++c) frame->sample[c] = (int16_t)scans[c];
   } else {
+    bits = clipped_in_filter(b, bits);
     decimator_step(&b->filter, scans, frame->sample);
   }
+  frame->status = (uint16_t)(frame->status | bits);
 }
 
 void board_on_scans(rig_board* b, const uint16_t* scans) {
@@ -117,6 +138,7 @@ uint32_t board_frames_missed(const rig_board* b, uint64_t now_ticks) {
 void board_on_adc_error(rig_board* b, uint32_t frames_missed) {
   ++b->adc_errors;
   b->sequence += frames_missed;
+  reset_filter(b); /* or it would mix what was before the gap into the frames behind it */
   b->pending_status = (uint16_t)(b->pending_status | TRW_STATUS_ADC_ERROR);
 }
 

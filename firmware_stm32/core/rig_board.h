@@ -41,6 +41,7 @@ typedef struct {
   /* written by commands, read by the sampling interrupt while it runs */
   trw_rate rate;
   uint32_t highest_rate_hz; /* of frames: what the stream carries */
+  uint32_t scan_ticks;      /* of the clock: what the converter needs for one scan */
   uint32_t packet_frames;
   bool running, pattern;
   uint32_t stops; /* how often it was stopped */
@@ -52,6 +53,7 @@ typedef struct {
   uint16_t pending_status; /* bits for the next frame that is kept */
   uint32_t ring_peak, overruns, adc_errors, isr_cycles;
   decimator filter;
+  uint64_t clipped_blocks; /* of the blocks in the filter, newest lowest: a bit for each channel */
 
   frame_ring ring;
   ring_slot slots[BOARD_RING_FRAMES];
@@ -75,9 +77,10 @@ typedef struct {
 } rig_board;
 
 /* `identity` without describe and fault record is filled in later by the caller, before the bus is connected.
- */
+ * Rates above `highest_rate_hz`, or with less than `scan_ticks` of tick_hz from scan to scan, are refused. */
 void board_init(rig_board* b, const board_port* port, void* port_context, const usb_controller* controller,
-                void* controller_context, const trw_identity* identity, uint32_t highest_rate_hz);
+                void* controller_context, const trw_identity* identity, uint32_t highest_rate_hz,
+                uint32_t scan_ticks);
 
 /* Sampling interrupt: the scans of one frame (rate.oversampling x TRW_CHANNELS conversions). */
 void board_on_scans(rig_board* b, const uint16_t* scans);
@@ -85,7 +88,8 @@ void board_on_scans(rig_board* b, const uint16_t* scans);
 /* Frames of time between the last one and `now_ticks` of the device clock, which no sample was taken for. */
 uint32_t board_frames_missed(const rig_board* b, uint64_t now_ticks);
 
-/* Sampling interrupt: a converter or DMA error; `frames_missed` frames of time went by unsampled. */
+/* Sampling interrupt: a converter or DMA error; `frames_missed` frames of time went by unsampled. The filter
+ * begins anew, as at a start. */
 void board_on_adc_error(rig_board* b, uint32_t frames_missed);
 
 /* Main loop: sends what there is to send. */

@@ -47,10 +47,14 @@ TEST(LossLedger, AJumpIsAGapWithItsLengthAndCause) {
   t.take({.first = 0});
   t.take({.first = 48});
   t.take({.first = 100, .first_status = TRW_STATUS_OVERRUN});
-  ASSERT_EQ(t.list.gaps.size(), 2u);
+  t.take({.first = 120, .first_status = TRW_STATUS_ADC_ERROR});
+  t.take({.first = 140, .first_status = TRW_STATUS_ADC_ERROR | TRW_STATUS_OVERRUN});
+  ASSERT_EQ(t.list.gaps.size(), 4u);
   EXPECT_EQ(t.list.gaps[0], (Gap{16, 32, "lost", false}));
   EXPECT_EQ(t.list.gaps[1], (Gap{32, 36, "overrun", false}));
-  EXPECT_EQ(t.tracker.ledger().frames_overrun, 1u);
+  EXPECT_EQ(t.list.gaps[2], (Gap{48, 4, "adc-error", false}));
+  EXPECT_EQ(t.list.gaps[3], (Gap{64, 4, "overrun", false})) << "both";
+  EXPECT_EQ(t.tracker.ledger().frames_overrun, 2u);
 }
 
 TEST(LossLedger, CountsWhatTheBoardFlags) {

@@ -230,8 +230,54 @@ TEST(FirmwareBoard, ConverterErrorsAreTimeThatIsMissing) {
   host.drain();
   ASSERT_EQ(host.gaps.size(), 1u);
   EXPECT_EQ(host.gaps[0].frames_lost, 5u);
+  EXPECT_EQ(host.gaps[0].cause, "adc-error");
   EXPECT_EQ(host.tracker.ledger().frames_adc_error, 1u);
   EXPECT_EQ(statistics(board).adc_errors, 1u);
+}
+
+/// Frames of eight equal conversions each, straight from the ring.
+class FilteredBoard : public testing::Test {
+ protected:
+  FilteredBoard() {
+    const trw_rate_wish wish{4000, 3, DECIMATION};
+    EXPECT_TRUE(board_set_rate(&board.core, &wish));
+    board_start(&board.core, false);
+  }
+  trw_frame next(const std::array<std::uint16_t, TRW_CHANNELS>& counts) {
+    std::array<std::uint16_t, std::size_t{DECIMATION} * TRW_CHANNELS> scans;
+    for (std::size_t i = 0; i < scans.size(); ++i) scans[i] = counts[i % TRW_CHANNELS];
+    const std::uint32_t slot = board.core.ring.head % BOARD_RING_FRAMES;
+    board_on_scans(&board.core, scans.data());
+    return board.core.slots[slot].frame;
+  }
+
+  Board board;
+};
+
+TEST_F(FilteredBoard, BehindAConverterErrorNothingIsLeftOfBefore) {
+  for (int i = 0; i < 30; ++i) (void)next({1000, 1000, 1000, 0});
+  board_on_adc_error(&board.core, 5);
+  for (int i = 0; i < 30; ++i) {
+    const trw_frame frame = next({3000, 2000, 1000, 500});
+    EXPECT_EQ(frame.sample[0], 3000) << i;
+    EXPECT_EQ(frame.sample[1], 2000) << i;
+    EXPECT_EQ(frame.status, i == 0 ? TRW_STATUS_ADC_ERROR : 0)
+        << "and nothing of what was clipped, frame " << i;
+  }
+}
+
+TEST_F(FilteredBoard, EveryFrameThatHoldsAClippedBlockSaysSo) {
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(next({2000, 2000, 2000, 2000}).status, 0);
+  for (int i = 0; i < 20; ++i) {
+    const trw_frame frame = next({2000, 2000, static_cast<std::uint16_t>(i == 0 ? 4095 : 2000), 2000});
+    EXPECT_EQ(frame.status, i < DECIMATOR_BLOCKS ? 1u << 2 : 0u) << i;
+    EXPECT_TRUE(frame.sample[2] == 2000 || frame.status != 0) << i;
+  }
+  (void)next({0, 2000, 2000, 2000});
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(next({2000, 2000, 2000, 2000}).status, 1);
+  board_stop(&board.core);
+  board_start(&board.core, false);
+  EXPECT_EQ(next({2000, 2000, 2000, 2000}).status, 0) << "another run";
 }
 
 TEST(FirmwareBoard, AConverterErrorInTheFirstFrameMissesNothing) {
@@ -277,6 +323,12 @@ TEST(FirmwareBoard, RatesAreThoseTheTimerMakesExactly) {
   EXPECT_EQ(set_rate(board, 1, 0, 1), kStall);
   EXPECT_EQ(set_rate(board, 12000, 1, 1), kStall) << "more than the stream carries";
   EXPECT_EQ(set_rate(board, 4000000000u, 1, 1), kStall);
+  EXPECT_EQ(set_rate(board, 10000, 1, 1), 0) << "the fastest";
+  for (const std::uint32_t rate_hz : {7000u, 7500u, 8000u, 10000u})
+    EXPECT_EQ(set_rate(board, rate_hz, 1, 8), kStall) << "a scan takes 18.4 us";
+  EXPECT_EQ(set_rate(board, 84000000, 8 * 1547, 8), kStall);
+  EXPECT_EQ(set_rate(board, 84000000, 8 * 1548, 8), 0) << "6782.9 Hz, the fastest with the filter";
+  EXPECT_EQ(set_rate(board, 1000, 1, 1), 0);
   vendor_out(board, TRW_USB_START);
   EXPECT_EQ(set_rate(board, 2000, 1, 1), kStall) << "not while running";
   EXPECT_EQ(rate(board).ticks_per_frame, 84000u);

@@ -79,6 +79,60 @@ void behave_well(RegisterModel& model) {
   }
 }
 
+SamplingHardware::SamplingHardware(RegisterModel& model, std::function<void()> interrupt)
+    : model_(model), interrupt_(std::move(interrupt)) {
+  model.on_write[DMA2_S0CR] = [this](std::uint32_t v) {
+    const bool was_on = (model_.values[DMA2_S0CR] & BIT(0)) != 0, on = (v & BIT(0)) != 0;
+    if (!was_on && on && model_.values[DMA2_LISR] != 0) throw std::logic_error("10.3.17: flags of old");
+    model_.values[DMA2_S0CR] = v;
+    if (was_on && !on) model_.values[DMA2_LISR] |= BIT(5);  // AN4031: a stream that is disabled sets TCIF
+    settle();
+  };
+  model.on_write[DMA2_LIFCR] = [this](std::uint32_t v) { model_.values[DMA2_LISR] &= ~v; };
+  model.on_write[ADC_CR2] = [this](std::uint32_t v) {
+    const bool was_on = (model_.values[ADC_CR2] & BIT(0)) != 0;
+    if (was_on && (v & BIT(0)) == 0 && (model_.values[DMA2_S0CR] & BIT(0)) != 0)
+      throw std::logic_error("10.3.17: the stream is switched off before its peripheral");
+    model_.values[ADC_CR2] = v;
+  };
+  model.on_write[NVIC_ICPR(IRQ_DMA2_STREAM0 / 32)] = [this](std::uint32_t v) {
+    if ((v & BIT(IRQ_DMA2_STREAM0 % 32)) != 0) pending_ = false;
+  };
+}
+
+void SamplingHardware::fill_buffer() {
+  model_.values[DMA2_S0CR] ^= BIT(19);
+  model_.values[DMA2_LISR] |= BIT(5);
+  settle();
+}
+
+void SamplingHardware::overrun() {
+  model_.values[ADC_SR] |= BIT(5);
+  settle();
+}
+
+bool SamplingHardware::asserted() const {
+  const auto both = [this](std::uint32_t flags, std::uint32_t enables, std::uint32_t flag,
+                           std::uint32_t enable) {
+    return (model_.values[flags] & BIT(flag)) != 0 && (model_.values[enables] & BIT(enable)) != 0;
+  };
+  return both(DMA2_LISR, DMA2_S0CR, 5, 4) || both(ADC_SR, ADC_CR1, 5, 26);
+}
+
+/// A line that is asserted makes the interrupt pending, within its own handler for another turn.
+void SamplingHardware::settle() {
+  pending_ |= asserted();
+  if (inside_) return;
+  for (int turn = 0; pending_; ++turn) {
+    if (turn == 10) throw std::logic_error("an interrupt that does not end");
+    pending_ = false;
+    inside_ = true;
+    interrupt_();
+    inside_ = false;
+    pending_ |= asserted();
+  }
+}
+
 OtgHost::OtgHost(RegisterModel& model) : model_(model) {
   model.on_read[OTG_GINTSTS] = [this](std::uint32_t v) {
     if (!words_.empty() || status_ != 0) v |= BIT(4);

@@ -141,6 +141,98 @@ TEST(Sampling, AStreamThatDoesNotStopIsNotWaitedForForEver) {
   sampling_start(63000, 1);
   sampling_stop();
   EXPECT_LT(model.reads, 100000u);
+  EXPECT_EQ(model.first_with(ADC_CR2, BIT(0)), -1) << "a converter without its stream would only overrun";
+}
+
+/// Sampling driver and core together, as the board's main file wires them.
+class SamplingRuns : public testing::Test {
+ protected:
+  SamplingRuns() {
+    port_ = {.start_sampling = [](void*, std::uint32_t ticks,
+                                  std::uint32_t scans) { sampling_start(ticks, scans); },
+             .stop_sampling = [](void*) { sampling_stop(); },
+             .ticks = [](void*) -> std::uint64_t { return 0; },
+             .lock = [](void*) -> std::uint32_t { return 0; },
+             .unlock = [](void*, std::uint32_t) {},
+             .set_amplifier = nullptr,
+             .reboot_to_loader = [](void*) {}};
+    trw_identity identity{};
+    identity.tick_hz = 84000000;
+    board_init(&core, &port_, nullptr, &otg_fs, nullptr, &identity, 10000, SAMPLING_SCAN_TICKS);
+    sampling_init();
+  }
+  void on_sampling() {
+    ++interrupts;
+    const std::uint16_t* scans = nullptr;
+    const sampling_result result = sampling_take(&scans);
+    if (result == SAMPLING_FRAME) board_on_scans(&core, scans);
+    if (result == SAMPLING_ERROR) board_on_adc_error(&core, 0);
+  }
+  bool stream_on() { return (model.values[DMA2_S0CR] & BIT(0)) != 0; }
+  bool converter_on() { return (model.values[ADC_CR2] & BIT(0)) != 0; }
+
+  RegisterModel model;
+  test::SamplingHardware hardware{model, [this] { on_sampling(); }};
+  rig_board core{};
+  board_port port_{};
+  int interrupts = 0;
+};
+
+TEST_F(SamplingRuns, AStopIsNoFrameAndNoError) {
+  for (std::uint32_t run = 0; run < 3; ++run) {
+    board_start(&core, false);
+    EXPECT_TRUE(stream_on() && converter_on());
+    const std::uint32_t first = core.ring.head;
+    for (std::uint32_t frame = 0; frame <= run; ++frame) hardware.fill_buffer();  // odd and even ones
+    ASSERT_EQ(core.ring.head, first + run + 1);
+    EXPECT_EQ(core.slots[first].frame.status & TRW_STATUS_ADC_ERROR, 0) << "run " << run;
+    interrupts = 0;
+    board_stop(&core);
+    EXPECT_FALSE(stream_on()) << "run " << run;
+    EXPECT_FALSE(converter_on()) << "run " << run;
+    EXPECT_EQ(interrupts, 0) << "clearing EN sets TCIF, which nobody is to be told of";
+    EXPECT_EQ(core.adc_errors, 0u);
+    EXPECT_EQ(core.ring.head, first + run + 1);
+  }
+}
+
+TEST_F(SamplingRuns, AnInterruptThatComesIntoAStopIsEndedAndIgnored) {
+  for (const bool overrun : {false, true}) {
+    board_start(&core, false);
+    const std::uint32_t frames = core.ring.head;
+    // The timer is off, but the last scan is not yet over.
+    model.on_write[TIM2 + TIM_CR2] = [&](std::uint32_t) {
+      overrun ? hardware.overrun() : hardware.fill_buffer();
+    };
+    board_stop(&core);
+    model.on_write.erase(TIM2 + TIM_CR2);
+    EXPECT_EQ(core.ring.head, frames);
+    EXPECT_FALSE(stream_on() || converter_on());
+    EXPECT_EQ(core.adc_errors, 0u);
+  }
+  EXPECT_EQ(interrupts, 2);
+}
+
+TEST_F(SamplingRuns, AnErrorStartsBothAnewWithOneInterrupt) {
+  board_start(&core, false);
+  hardware.fill_buffer();
+  hardware.overrun();
+  EXPECT_TRUE(stream_on() && converter_on());
+  EXPECT_EQ(interrupts, 2) << "the stream's being stopped is no interrupt of its own";
+  EXPECT_EQ(core.adc_errors, 1u);
+  model.values[DMA2_S0CR] &= ~BIT(19);
+  hardware.fill_buffer();
+  EXPECT_EQ(core.ring.head, 2u);
+  EXPECT_EQ(core.slots[1].frame.status & TRW_STATUS_ADC_ERROR, TRW_STATUS_ADC_ERROR);
+}
+
+TEST_F(SamplingRuns, WhatOneRunLeftPendingIsNotTheNextOnes) {
+  board_start(&core, false);
+  hardware.overrun();
+  board_stop(&core);
+  board_start(&core, false);
+  hardware.fill_buffer();
+  EXPECT_EQ(core.slots[0].frame.status & TRW_STATUS_ADC_ERROR, 0);
 }
 
 /// The OTG driver above the model, with the whole core on top.
@@ -158,7 +250,7 @@ class OtgFs : public testing::Test {
     port_ = port;
     trw_identity identity{};
     identity.tick_hz = 84000000;
-    board_init(&core, &port_, nullptr, &otg_fs, nullptr, &identity, 10000);
+    board_init(&core, &port_, nullptr, &otg_fs, nullptr, &identity, 10000, SAMPLING_SCAN_TICKS);
   }
   std::vector<std::uint8_t> control_in(const std::vector<std::uint8_t>& packet) {
     host->setup(packet);

@@ -7,6 +7,7 @@ namespace {
 
 constexpr std::uint32_t kTick_hz = 84000000;
 constexpr std::uint32_t kHighestRate_hz = 10000;
+constexpr std::uint32_t kScan_ticks = 1548;  // the F405's 18.4 us
 
 Board& self(void* context) { return *static_cast<Board*>(context); }
 
@@ -47,7 +48,8 @@ void Board::power_up() {
   identity.amplifier_mask = amplifier_fitted ? 0x0F : 0;
   identity.variant = TRW_VARIANT_SIMULATED;
   std::strcpy(identity.describe, "simulated");
-  board_init(&core, &port(), this, &Controller::table(), &controller, &identity, kHighestRate_hz);
+  board_init(&core, &port(), this, &Controller::table(), &controller, &identity, kHighestRate_hz,
+             kScan_ticks);
   controller.reset();
 }
 
