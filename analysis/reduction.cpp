@@ -60,19 +60,31 @@ void read_thrusts_from_volts(const CampaignData& data, const Run& run, const Run
   }
 }
 
-/// Why a run with raw data cannot be reduced; empty where it can.
-std::string why_not(const CampaignData& data, const Run& run, const RawRun& raw) {
+/// Why the means of a run with raw data, thrust or tare, cannot be used; without a reason where they can.
+LeftOutRun why_not(const CampaignData& data, const Run& run, const RawRun& raw) {
+  if (raw.state != RunState::kComplete) return {run.run, "its recording is partial", false};
   const auto statistics = data.statistics.find(run.run);
   if (statistics == data.statistics.end())
-    return "no statistics are stored; `reduce --from-raw` computes them";
+    return {run.run, "no statistics are stored; `reduce --from-raw` computes them"};
   if (statistics->second.hash != raw.hash)
-    return "its statistics are of other raw data; `reduce --from-raw` computes them anew";
+    return {run.run, "its statistics are of other raw data; `reduce --from-raw` computes them anew"};
   for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
-    if (statistics->second.channels[static_cast<std::size_t>(rotor)].stuck()) {
-      return fmt::format("channel {} is stuck: it never changes", rotor + 1);
-    }
+    if (statistics->second.channels[static_cast<std::size_t>(rotor)].stuck())
+      return {run.run, fmt::format("channel {} is stuck: it never changes", rotor + 1)};
   }
-  return "";
+  return {run.run, ""};
+}
+
+/// A tare that is no zero shows in no run: those of its session have another zero without a word.
+void leave_out_tares(const CampaignData& data, std::vector<LeftOutRun>& left_out) {
+  for (const Run& run : data.runs) {
+    const auto raw = data.raw.find(run.run);
+    if (run.kind != RunKind::kTare || !run.excluded.empty() || raw == data.raw.end()) continue;
+    LeftOutRun tare = why_not(data, run, raw->second);
+    if (tare.reason.empty()) continue;
+    tare.reason += " (this tare is no zero)";
+    left_out.push_back(std::move(tare));
+  }
 }
 
 }  // namespace
@@ -82,8 +94,8 @@ std::vector<std::size_t> recorded_runs(const CampaignData& data, RunKind kind) {
   for (std::size_t r = 0; r < data.runs.size(); ++r) {
     const Run& run = data.runs[r];
     const auto raw = data.raw.find(run.run);
-    if (run.kind == kind && run.excluded.empty() && data.statistics.contains(run.run) &&
-        raw != data.raw.end() && raw->second.state == RunState::kComplete)
+    if (run.kind == kind && run.excluded.empty() && raw != data.raw.end() &&
+        why_not(data, run, raw->second).reason.empty())
       recorded.push_back(r);
   }
   return recorded;
@@ -195,12 +207,8 @@ Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms) {
       continue;
     }
     if (const auto raw = data.raw.find(run.run); raw != data.raw.end()) {
-      if (raw->second.state != RunState::kComplete) {
-        reduction.left_out.push_back({run.run, "its recording is partial", false});
-        continue;
-      }
-      if (const std::string reason = why_not(data, run, raw->second); !reason.empty()) {
-        reduction.left_out.push_back({run.run, reason});
+      if (LeftOutRun out = why_not(data, run, raw->second); !out.reason.empty()) {
+        reduction.left_out.push_back(std::move(out));
         continue;
       }
       if (!data.certificate)
@@ -228,6 +236,7 @@ Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms) {
                          : fmt::format("no run can be reduced; run {}: {}", reduction.left_out[0].run,
                                        reduction.left_out[0].reason));
   }
+  leave_out_tares(data, reduction.left_out);
   return reduction;
 }
 

@@ -80,12 +80,14 @@ struct Reduction {
   std::string model_name() const;
 };
 
-/// Reduces every thrust run that can be; the others are left out by name. Throws InputError where no run can
+/// Reduces every thrust run that can be; the others are left out by name, and so are tares that cannot be
+/// zeros. Throws InputError where no run can
 /// be, where raw runs have no calibration, and where a switched-on term lacks its measurement in some run.
 Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms);
 
-/// Indices in CampaignData::runs of those of a kind that are recorded whole and not excluded. Tares among
-/// them serve as such: the motors are stopped.
+/// Indices in CampaignData::runs of those of a kind whose means can be used: recorded whole, not excluded,
+/// with statistics of these raw data and no channel stuck. Tares among them serve as such: the motors are
+/// stopped.
 std::vector<std::size_t> recorded_runs(const CampaignData& data, RunKind kind);
 
 /// The readings of the tares in the same order, each at its middle.

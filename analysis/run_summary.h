@@ -14,7 +14,7 @@ namespace tunnelrig {
 /// - standard error of the mean: from the means of blocks of about 50 ms by Geyer's initial positive
 /// sequence, so that
 ///   turbulence that lasts longer than a sample is not taken for independent samples
-/// - spectrum: Welch's method, Hann windows of 2048 frames, half overlapped; lines above their surroundings,
+/// - spectrum: Welch's method, Hann windows of 4096 frames, half overlapped; lines above their surroundings,
 /// named where
 ///   they lie at the shaft's or the mains' frequency or an alias of it
 /// `with_spectrum` false leaves the lines and the shaft's frequency out.

@@ -212,6 +212,9 @@ class LiveLogging {
              .duration_s = planned.duration_s,
              .speed_rpm = number("speed_rpm"),
              .air_temperature_C = number("air_temperature_C")};
+    // What was asked for until here was another run's. Ctrl-C stays, whenever it comes.
+    stop_requested = false;
+    if (quit_requested) stop_requested = true;
     page_.feed().begin(here_);
   }
 
@@ -238,7 +241,6 @@ class LiveLogging {
             }};
     placed_.reset();
     code_ = std::max(code_, logging_.record(planned, "", watch));
-    if (!quit_requested) stop_requested = false;
     left_ = runs_left(logging_.file(), plan_);
   }
 

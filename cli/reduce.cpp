@@ -101,6 +101,17 @@ bool warn_of(const std::optional<ImplausibleThrust>& doubt) {
   return doubt && doubt->too_much;
 }
 
+/// Tares whose zeros clipped samples bias.
+std::size_t clipped_tares(const CampaignData& data) {
+  const auto tares = recorded_runs(data, RunKind::kTare);
+  const std::ptrdiff_t rotors = data.info.rig.rotors;
+  return static_cast<std::size_t>(std::ranges::count_if(tares, [&](std::size_t tare) {
+    const auto& channels = data.statistics.at(data.runs[tare].run).channels;
+    return std::any_of(channels.begin(), channels.begin() + rotors,
+                       [](const ChannelStatistics& channel) { return channel.clipped > 0; });
+  }));
+}
+
 /// Says what was left out, and what cannot be. True where that needs mending.
 bool warn_of_left_out(const CampaignData& data, const Reduction& reduction) {
   bool problem = false;
@@ -114,8 +125,9 @@ bool warn_of_left_out(const CampaignData& data, const Reduction& reduction) {
     moving += run.stationary ? 0 : 1;
     untared += run.zero_from_calibration ? 1 : 0;
   }
-  if (clipped > 0)
-    warn(fmt::format("{} runs hold clipped samples, which bias their means (`tunnelrig doctor`)", clipped));
+  if (const std::size_t tares = clipped_tares(data); clipped + tares > 0)
+    warn(fmt::format("{} runs{} hold clipped samples, which bias their means (`tunnelrig doctor`)",
+                     clipped + tares, tares > 0 ? fmt::format(" ({} of them tares)", tares) : ""));
   if (moving > 0)
     warn(fmt::format("{} runs drift by more than their noise explains (`tunnelrig doctor`)", moving));
   if (untared > 0 && data.certificate) {

@@ -13,8 +13,8 @@
 namespace tunnelrig::cli {
 
 /// Sessions of the virtual rig are consecutive days from 2026-03-02, runs follow each other every five
-/// minutes from 08:00, whatever the time of the wall clock: what it measures is then a function of the seed
-/// and of the runs alone.
+/// minutes from 08:00, or a minute after a longer one's end, whatever the time of the wall clock: what it
+/// measures is then a function of the seed and of the runs alone.
 class VirtualSession {
  public:
   /// A new file is given what the virtual benches measure: calibration points and propeller tests.
@@ -30,9 +30,12 @@ class VirtualSession {
   }
 
  private:
+  /// From the session's begin to where its next run may begin.
+  double& taken_s(const std::string& session);
+
   VirtualRig rig_;
-  std::vector<std::string> sessions_;  // in order of first appearance
-  std::map<std::string, int> runs_;    // of each session so far
+  std::vector<std::string> sessions_;      // in order of first appearance
+  std::map<std::string, double> taken_s_;  // by the runs of each so far
 };
 
 }  // namespace tunnelrig::cli

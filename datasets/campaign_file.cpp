@@ -77,15 +77,23 @@ std::string now_utc() {
   return format_utc(std::chrono::duration<double>(now).count());
 }
 
+/// `name`.PROCESS.part: a staged campaign of some process, and no file of the user's.
+bool is_leftover(std::string_view file, std::string_view name) {
+  if (!file.starts_with(name) || !file.ends_with(kStagedSuffix) ||
+      file.size() < name.size() + kStagedSuffix.size() + 2)
+    return false;
+  file.remove_prefix(name.size());
+  file.remove_suffix(kStagedSuffix.size());
+  return file.front() == '.' && file.find_first_not_of("0123456789", 1) == std::string_view::npos;
+}
+
 /// What an import that was killed left beside its target; whoever holds the target's lock may sweep it up.
 void remove_leftovers(const std::filesystem::path& target) {
   std::error_code error;
-  const std::string prefix = target.filename().string() + ".";
+  const std::string name = target.filename().string();
   const auto folder = std::filesystem::absolute(target, error).parent_path();
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with(prefix) && name.ends_with(kStagedSuffix))
-      std::filesystem::remove(entry.path(), error);
+    if (is_leftover(entry.path().filename().string(), name)) std::filesystem::remove(entry.path(), error);
   }
 }
 

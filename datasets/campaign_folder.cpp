@@ -200,7 +200,8 @@ class RawImport {
         options_(options),
         summary_(summary),
         volts_(info),
-        overlaps_(info) {}
+        overlaps_(info),
+        stuck_tares_(info) {}
 
   void add(const Run& run) {
     const fs::path path = raw_path(folder_, run);
@@ -225,6 +226,7 @@ class RawImport {
     while (!in_work_.empty()) settle_oldest();
     for (const std::string& doubt : volts_.doubts()) summary_.doubts.push_back(doubt);
     for (const std::string& doubt : overlaps_.doubts()) summary_.doubts.push_back(doubt);
+    for (const std::string& doubt : stuck_tares_.doubts()) summary_.doubts.push_back(doubt);
   }
 
  private:
@@ -250,6 +252,7 @@ class RawImport {
     check_statistics(statistics, info_, raw->npy.format(), raw->run, options_.allow_stuck);
     volts_.look_at(raw->run, raw->npy.format(), statistics);
     overlaps_.look_at(raw->run, statistics, raw->gaps);
+    stuck_tares_.look_at(raw->run, statistics);
     store_statistics(file_, raw->id, statistics);
     summary_.raw_runs += 1;
     summary_.frames += raw->npy.frames();
@@ -263,6 +266,7 @@ class RawImport {
   ImportSummary& summary_;
   VoltDoubt volts_;
   OverlapDoubt overlaps_;
+  StuckTareDoubt stuck_tares_;
   std::deque<std::unique_ptr<RunInWork>> in_work_;
 };
 

@@ -271,4 +271,23 @@ Doubts OverlapDoubt::doubts() const {
   return {first + (count > 1 ? fmt::format(" It is so of {} runs", count) : "")};
 }
 
+void StuckTareDoubt::look_at(const Run& run, const RunStatistics& statistics) {
+  if (run.kind != RunKind::kTare || !run.excluded.empty()) return;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(info_.rig.rotors); ++c) {
+    const ChannelStatistics& channel = statistics.channels[c];
+    if (!channel.stuck()) continue;
+    if (++tares_ == 1)
+      first_ = fmt::format(
+          "runs.csv:{}: run {}: channel {} of {} is stuck at {:g} V for the whole run: `reduce` leaves this "
+          "tare out",
+          run.line, run.run, c + 1, run.raw, channel.lowest_V);
+    return;
+  }
+}
+
+Doubts StuckTareDoubt::doubts() const {
+  if (tares_ == 0) return {};
+  return {first_ + (tares_ > 1 ? fmt::format(". It is so of {} tares", tares_) : "")};
+}
+
 }  // namespace tunnelrig

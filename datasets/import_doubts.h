@@ -53,4 +53,19 @@ class OverlapDoubt {
   std::vector<Recording> recordings_;
 };
 
+/// Tares with a channel that never changes, which are no zeros. Such a thrust run is refused; a tare that was
+/// lost need not hold up the others.
+class StuckTareDoubt {
+ public:
+  explicit StuckTareDoubt(const CampaignInfo& info) : info_(info) {}
+
+  void look_at(const Run& run, const RunStatistics& statistics);
+  std::vector<std::string> doubts() const;
+
+ private:
+  const CampaignInfo& info_;
+  std::string first_;
+  std::size_t tares_ = 0;
+};
+
 }  // namespace tunnelrig

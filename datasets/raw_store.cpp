@@ -1,6 +1,7 @@
 #include "datasets/raw_store.h"
 
 #include "datasets/error.h"
+#include "datasets/raw_key.h"
 #include "datasets/sqlite.h"
 
 #include <algorithm>
@@ -12,10 +13,6 @@ namespace {
 constexpr std::array<std::string_view, 3> kStates = {"recording", "complete", "partial"};
 
 constexpr std::string_view kInterrupted = "the recorder ended before the run did";
-
-std::int64_t chunk_key(std::int64_t raw_run, std::uint64_t first_frame) {
-  return (raw_run << 32) | static_cast<std::int64_t>(first_frame);
-}
 
 RunState state_from_name(const std::string& name) {
   const auto found = std::find(kStates.begin(), kStates.end(), name);
@@ -260,12 +257,12 @@ std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run) 
 void read_raw(const CampaignFile& file, const RawRun& run, FrameSink& sink) {
   Statement select(file.database(),
                    "SELECT id, crc32c, data FROM raw_chunks WHERE id BETWEEN ? AND ? ORDER BY id");
-  select.bind(chunk_key(run.id, 0)).bind(chunk_key(run.id, 0xFFFFFFFFu));
+  select.bind(chunk_key(run.id, 0)).bind(chunk_key(run.id, kLastFrame));
   GapCursor cursor(gaps_of(file, run.id), sink);
   const std::size_t frame_size = run.format.frame_size();
   std::uint64_t next = 0;
   while (select.step()) {
-    const std::uint64_t first = from_sql(select.integer(0)) & 0xFFFFFFFFu;
+    const std::uint64_t first = from_sql(select.integer(0)) & kLastFrame;
     const auto data = select.blob(2);
     if (first != next || data.size() % frame_size != 0 || crc32c(data) != select.integer(1)) {
       throw StorageError(fmt::format("{}: run {}: the raw data at frame {} are damaged", file.path().string(),

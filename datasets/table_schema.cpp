@@ -155,9 +155,16 @@ void read_speed(const Reader& top, TableSchema& schema) {
   schema.speed_column = column.column;
   add_covariate(column, Reader::line(*table), schema);
   const auto poles = reader.number("pole_count", 2, 200);
-  if (reader.flag("electrical") && !poles) {
+  const bool electrical = reader.flag("electrical");
+  if (electrical && !poles) {
     throw InputError::at(file, Reader::line(*table),
                          "speed.pole_count is required where the speed is electrical");
+  }
+  if (poles && !electrical) {
+    // Either the speeds are electrical or the key is idle: which, only who wrote the schema knows.
+    throw InputError::at(file, reader.line_of("pole_count"),
+                         "speed.pole_count is of electrical speeds: write electrical = true beside it, or "
+                         "leave it out where the speed is the shaft's");
   }
   if (poles && std::fmod(*poles, 2) != 0)
     throw InputError::at(file, Reader::line(*table),

@@ -68,7 +68,8 @@ Table run_coefficients(const CampaignData& data, const Reduction& reduction) {
 }
 
 Table left_out(const Reduction& reduction) {
-  return TableBuilder("left_out", "Thrust runs without coefficients", reduction.left_out)
+  return TableBuilder("left_out", "Thrust runs without coefficients, and tares that are no zeros",
+                      reduction.left_out)
       .column("run", "", "Name of the run", &LeftOutRun::run)
       .column("reason", "", "Why it was not reduced", &LeftOutRun::reason)
       .column("problem", "1", "1: it needs mending", &LeftOutRun::problem)

@@ -6,6 +6,7 @@
 #include "analysis/maps/tunnel_maps.h"
 #include "analysis/reduction_output.h"
 #include "datasets/error.h"
+#include "datasets/snapshot.h"
 #include "datasets/staged_output.h"
 
 #include <algorithm>
@@ -192,6 +193,7 @@ Parts parts_from_names(std::string_view names) {
 
 Exported export_campaign(const CampaignFile& file, const std::filesystem::path& target,
                          const Settings& settings, const Progress& progress) {
+  const Snapshot snapshot(file);  // what a recorder adds meanwhile is in no part
   refuse_campaign_itself(file, target);
   const auto kind = is_folder(settings.format) ? StagedOutput::Kind::kFolder : StagedOutput::Kind::kFile;
   StagedOutput staged(target, kind);

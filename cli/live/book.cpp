@@ -1,6 +1,7 @@
 #include "cli/live/book.h"
 
 #include "analysis/model/model_store.h"
+#include "analysis/reduction.h"
 #include "datasets/error.h"
 #include "datasets/recorder_lock.h"
 
@@ -49,20 +50,17 @@ CellKnowledge cells_of(const CampaignData& data) {
           force.d_voltage_N_per_V / data.certificate->propellers.factor(rotor), fit.zero_V};
     }
   }
-  for (const Run& run : data.runs) {
-    const auto statistics = data.statistics.find(run.run);
-    const auto raw = data.raw.find(run.run);
-    if (run.kind != RunKind::kTare || !run.excluded.empty() || statistics == data.statistics.end() ||
-        raw == data.raw.end() || raw->second.state != RunState::kComplete)
-      continue;
+  for (const std::size_t r : recorded_runs(data, RunKind::kTare)) {
+    const Run& run = data.runs[r];
+    const RunStatistics& statistics = data.statistics.at(run.run);
     const auto before = cells.tares.find(run.session);
     CellKnowledge::Tare tare;
     const auto source = run.labels.find("source");
     tare.simulated = source != run.labels.end() && source->second.starts_with("virtual");
-    tare.end_s = run.start_s + statistics->second.elapsed_s(data.info.daq.sample_rate_hz);
+    tare.end_s = run.start_s + statistics.elapsed_s(data.info.daq.sample_rate_hz);
     const auto rotors = static_cast<std::size_t>(data.info.rig.rotors);
-    for (std::size_t c = 0; c < std::min(rotors, statistics->second.channels.size()); ++c) {
-      tare.mean_V[c] = statistics->second.channels[c].mean_V;
+    for (std::size_t c = 0; c < std::min(rotors, statistics.channels.size()); ++c) {
+      tare.mean_V[c] = statistics.channels[c].mean_V;
       if (before == cells.tares.end()) continue;
       const double drift_V = tare.mean_V[c] - before->second.mean_V[c];
       if (tare.drift_rotor != 0 && std::abs(drift_V) <= std::abs(tare.drift_V)) continue;

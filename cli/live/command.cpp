@@ -22,7 +22,7 @@ constexpr std::size_t kLongestText = 2000;
 const std::map<std::string, std::vector<std::string>>& commands() {
   static const std::map<std::string, std::vector<std::string>> table = {
       {"start", {"location", "session", "repeat", "kind", "duration_s"}},
-      {"stop", {}},
+      {"stop", {"run"}},
       {"tare", {"location", "session", "duration_s"}},
       {"next", {}},
       {"note", {"run", "text"}},

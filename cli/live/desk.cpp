@@ -28,16 +28,21 @@ CommandResult Desk::execute(const Command& command) {
     changed_();
     return {.problem = "", .text = "from the next run on"};
   }
+  if (name == "stop") return stop(command);
   const Position position = feed_.position();
-  const bool recording = position.phase == Phase::kRecording;
-  if (name == "stop") {
-    if (!recording) return {.problem = "nothing is being recorded", .text = ""};
-    stop_ = true;
-    return {.problem = "", .text = fmt::format("{} ends here; it is kept as partial", position.run.run)};
-  }
-  if (recording)
+  if (position.phase == Phase::kRecording)
     return {.problem = fmt::format("{} is being recorded; stop it first", position.run.run), .text = ""};
   return hand_over(command);
+}
+
+/// A page names the run that it shows: by the time its command is here, that may be over and the next begun.
+CommandResult Desk::stop(const Command& command) {
+  const Position position = feed_.raise_in_run(command.run, stop_);
+  const std::string& run = position.run.run;
+  if (position.phase != Phase::kRecording) return {.problem = "nothing is being recorded", .text = ""};
+  if (!command.run.empty() && command.run != run)
+    return {.problem = fmt::format("{} is being recorded, not {}", run, command.run), .text = ""};
+  return {.problem = "", .text = fmt::format("{} ends here; it is kept as partial", run)};
 }
 
 CommandResult Desk::hand_over(const Command& command) {

@@ -55,6 +55,7 @@ class Desk {
   std::map<std::string, std::optional<double>> metadata() const;
 
  private:
+  CommandResult stop(const Command& command);
   CommandResult hand_over(const Command& command);
   CommandResult mark(const Command& command);
   CommandResult aim(const Command& command);

@@ -84,6 +84,7 @@ void LiveFeed::progress(const LogProgress& progress) {
 
 std::string LiveFeed::end(const LogOutcome& outcome) {
   const std::lock_guard lock(mutex_);
+  shared_.position.phase = Phase::kIdle;
   const LiveRun& run = shared_.position.run;
   if (run.kind == RunKind::kTare && outcome.state == RunState::kComplete)
     shared_.tare_ended[run.session] = std::chrono::steady_clock::now();
@@ -98,6 +99,13 @@ void LiveFeed::place(const Position& position) {
 Position LiveFeed::position() const {
   const std::lock_guard lock(mutex_);
   return shared_.position;
+}
+
+Position LiveFeed::raise_in_run(const std::string& run, std::atomic<bool>& flag) const {
+  const std::lock_guard lock(mutex_);
+  const Position& here = shared_.position;
+  if (here.phase == Phase::kRecording && (run.empty() || run == here.run.run)) flag = true;
+  return here;
 }
 
 void LiveFeed::know(CellKnowledge cells) {

@@ -14,6 +14,7 @@
 #include "daq/live/running_blocks.h"
 #include "daq/logger.h"
 
+#include <atomic>
 #include <condition_variable>
 #include <filesystem>
 #include <map>
@@ -48,7 +49,8 @@ class LiveFeed {
   FrameSink& watcher() { return ring_; }
   void begin(const LiveRun& run);
   void progress(const LogProgress& progress);
-  /// The kinds of alarm that the run is to be marked with.
+  /// The kinds of alarm that the run is to be marked with. Until the next `begin` or `place` nothing is
+  /// recorded: what comes between is the report, or the next run's board.
   std::string end(const LogOutcome& outcome);
   void place(const Position& position);
 
@@ -56,6 +58,9 @@ class LiveFeed {
   // -------------------------------------------------------------------------------------------
 
   Position position() const;
+  /// Raises `flag` if `run` (empty: whichever) is being recorded, without one ending and another beginning in
+  /// between. Where things stood then.
+  Position raise_in_run(const std::string& run, std::atomic<bool>& flag) const;
   void know(CellKnowledge cells);
   void aim(const Target& target);
   Target target() const;

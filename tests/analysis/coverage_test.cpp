@@ -20,9 +20,44 @@ struct Scenario {
   double run = 0.0025, visit = 0, session = 0.0015;  // relative scatter of the thrust
   double rotor = 0.001;
   double gauge_N = 0.002, reading_V = 0.0002;  // so good that the scatter between runs is what matters
-  bool tares = true;
+  int tares = 2;                               // of each session, evenly from its begin to its end
+  double wander_V = 0;  // of a zero, from a session's begin to its end, as a random walk
+  double drift_V = 0;   // likewise, in a straight line
   double tachometer_rpm = 0, thermometer_K = 0;  // systematic, declared in campaign.toml
   bool uneven_scatter = false;                   // locations scatter by factors of 0.4 to 2.5
+};
+
+constexpr double kSession_s = 30000;
+
+/// What the four zeros of a session do in its course.
+class Zeros {
+ public:
+  Zeros(const Scenario& s, const std::array<double, 4>& at_first, std::mt19937_64& engine) {
+    std::normal_distribution<double> unit;
+    std::array<double, 4> slope{};
+    for (double& each : slope) each = s.drift_V == 0 ? 0 : s.drift_V * unit(engine) / kSteps;
+    path_.push_back(at_first);
+    for (int step = 0; step < kSteps; ++step) {
+      path_.push_back(path_.back());
+      for (std::size_t i = 0; i < 4; ++i)
+        path_.back()[i] +=
+            slope[i] + (s.wander_V == 0 ? 0 : s.wander_V * unit(engine) / std::sqrt(double{kSteps}));
+    }
+  }
+
+  /// Of a run that begins so long after the session did.
+  std::array<double, 4> at(double time_s) const {
+    const double step = time_s / kSession_s * kSteps;
+    const auto before = std::min(static_cast<std::size_t>(step), std::size_t{kSteps - 1});
+    std::array<double, 4> zero = path_[before];
+    for (std::size_t i = 0; i < 4; ++i)
+      zero[i] += (step - static_cast<double>(before)) * (path_[before + 1][i] - zero[i]);
+    return zero;
+  }
+
+ private:
+  static constexpr int kSteps = 300;
+  std::vector<std::array<double, 4>> path_;
 };
 
 struct Campaign {
@@ -79,7 +114,7 @@ Campaign make_campaign(const Scenario& s, std::mt19937_64& engine) {
 
   // sessions and their tares
   std::vector<double> session_factor, visit_factor;
-  std::vector<std::array<double, 4>> session_zero;
+  std::vector<Zeros> session_zero;
   const auto add_run = [&](const std::string& location, int session, int repeat, RunKind kind, double at_s,
                            const std::array<double, 4>& volts, double celsius) {
     Run run;
@@ -106,11 +141,13 @@ Campaign make_campaign(const Scenario& s, std::mt19937_64& engine) {
   for (int session = 0; session < s.sessions; ++session) {
     session_factor.push_back(1 + normal(s.session));
     std::array<double, 4> volts{};
-    for (std::size_t i = 0; i < 4; ++i) volts[i] = zero[i] + (s.tares ? normal(0.003) : 0);
-    session_zero.push_back(volts);
-    if (!s.tares) continue;
-    add_run("OT", session, 1, RunKind::kTare, 86400.0 * session, volts, 20);
-    add_run("OT", session, 2, RunKind::kTare, 86400.0 * session + 30000, volts, 20);
+    for (std::size_t i = 0; i < 4; ++i) volts[i] = zero[i] + (s.tares > 0 ? normal(0.003) : 0);
+    session_zero.emplace_back(s, volts, engine);
+    for (int tare = 0; tare < s.tares; ++tare) {
+      const double at_s = kSession_s * tare / (s.tares - 1);
+      add_run("OT", session, tare + 1, RunKind::kTare, 86400.0 * session + at_s, session_zero.back().at(at_s),
+              20);
+    }
   }
 
   // runs
@@ -131,15 +168,16 @@ Campaign make_campaign(const Scenario& s, std::mt19937_64& engine) {
       const double density = 101325 / (287.058 * (celsius + 273.15));
       const double total = campaign.c_t[l] * 0.5 * density * omega * omega * 0.1524 * 0.1524 * M_PI * 0.1524 *
                            0.1524 * session_factor[si] * visits[l][si] * (1 + normal(s.run * scatter[l]));
-      std::array<double, 4> volts{};
+      const double at_s = std::fmod(7919.0 * static_cast<double>(data.runs.size()), kSession_s);
+      std::array<double, 4> volts = session_zero[si].at(at_s);
       for (std::size_t i = 0; i < 4; ++i) {
         const double side = i == 0 || i == 3 ? 1 : -1;
         const double thrust =
             total / 4 * (1 + side * campaign.u_percent[l] / 100) * (1 + normal(s.rotor)) * k[i];
-        volts[i] = session_zero[si][i] + gain[i] * thrust;
+        volts[i] += gain[i] * thrust;
       }
-      add_run("X" + std::to_string(l), session, repeat, RunKind::kThrust,
-              86400.0 * session + 100 * repeat + 10 * static_cast<double>(l), volts, celsius + thermometer);
+      add_run("X" + std::to_string(l), session, repeat, RunKind::kThrust, 86400.0 * session + at_s, volts,
+              celsius + thermometer);
     }
   }
   return campaign;
@@ -195,11 +233,13 @@ INSTANTIATE_TEST_SUITE_P(
         Scenario{.name = "two visits of five", .repeats = 10, .visits = 2},
         Scenario{.name = "two visits, visit scatter", .repeats = 10, .visits = 2, .visit = 0.002},
         Scenario{.name = "three repeats", .locations = 15, .repeats = 3, .sessions = 6},
-        Scenario{.name = "calibration's own zero", .tares = false},
+        Scenario{.name = "calibration's own zero", .tares = 0},
         Scenario{.name = "instruments declared", .tachometer_rpm = 7.5, .thermometer_K = 0.5},
         Scenario{.name = "ordinary gauge", .gauge_N = 0.02, .reading_V = 0.002},
         Scenario{.name = "coarse gauge", .gauge_N = 0.1},
         Scenario{.name = "locations scatter unevenly", .repeats = 10, .uneven_scatter = true},
+        Scenario{.name = "random walk of the zero", .tares = 3, .wander_V = 0.01},
+        Scenario{.name = "drift of the zero", .drift_V = 0.02},
         Scenario{.name = "four sessions", .sessions = 4},
         Scenario{.name = "the thesis's size", .locations = 42, .repeats = 10, .sessions = 14, .visits = 2}),
     [](const auto& scenario) {

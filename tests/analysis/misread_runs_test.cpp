@@ -39,6 +39,7 @@ struct MisreadRunsTest : testing::Test {
     for (ChannelStatistics& channel : statistics.channels) {
       channel.mean_V = kZero_V + kGain_V_per_N * (thrust_N + wandered_N);
       channel.standard_error_V = kGain_V_per_N * 0.01;
+      channel.highest_V = 3;
     }
   }
   void load(const std::string& run, std::size_t rotors, double force_N) {

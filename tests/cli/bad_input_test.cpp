@@ -6,6 +6,7 @@
 #include "support/temporary_folder.h"
 
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <functional>
 #include <future>
@@ -84,6 +85,33 @@ TEST_F(BadInput, ZeroFramesAndStuckChannel) {
   test::write_npy(folder / "source/raw/R3.npy", {}, 400, stuck);
   EXPECT_THAT(refusal_of("import source --db c.db", {"source"}),
               HasSubstr("channel 1 of raw/R3.npy is stuck"));
+}
+
+/// A thrust run like this is refused; what becomes of a tare is said twice.
+TEST_F(BadInput, TaresThatAreStuckOrClipped) {
+  campaign.runs_csv +=
+      "T1,OT,1,S1,2026-03-02T07:50:00Z,raw/T1.npy,0,0,,20\nT2,OT,2,S2,2026-03-03T07:50:00Z,raw/"
+      "T2.npy,0,0,,18\n";
+  replace(campaign.runs_csv, ",air_temperature_C\n", ",air_temperature_C,kind\n");
+  for (const char* row : {",20.5\n", ",20.7\n", ",18.0\n"})
+    replace(campaign.runs_csv, row, std::string(row, std::strlen(row) - 1) + ",thrust\n");
+  for (const char* row : {",,20\n", ",,18\n"})
+    replace(campaign.runs_csv, row, std::string(row, std::strlen(row) - 1) + ",tare\n");
+  campaign.write(folder / "source");
+  auto stuck = test::example_frames(400, 1), clipped = test::example_frames(400, 2);
+  for (std::size_t i = 0; i < 400; ++i) stuck[i * 8 + 2] = stuck[i * 8 + 3] = std::byte{4};
+  clipped[0] = std::byte{0xFF};
+  clipped[1] = std::byte{0x0F};
+  test::write_npy(folder / "source/raw/T1.npy", {}, 400, stuck);
+  test::write_npy(folder / "source/raw/T2.npy", {}, 400, clipped);
+  const ProgramResult imported = test::run_program(folder.path(), "import source --db c.db");
+  EXPECT_EQ(imported.code, 0) << imported.error;
+  EXPECT_THAT(imported.error, HasSubstr("runs.csv:5: run T1: channel 2 of raw/T1.npy is stuck at"));
+  test::run_program(folder.path(), "calibrate --db c.db");
+  const ProgramResult reduced = test::run_program(folder.path(), "reduce --db c.db");
+  EXPECT_EQ(reduced.code, 1) << reduced.error;
+  EXPECT_THAT(reduced.error, HasSubstr("run T1 is left out: channel 2 is stuck"));
+  EXPECT_THAT(reduced.error, HasSubstr("1 runs (1 of them tares) hold clipped samples"));
 }
 
 TEST_F(BadInput, AMapOfTwoLocations) {

@@ -136,6 +136,18 @@ TEST_F(Chain, PlanResumesWhereItStopped) {
   EXPECT_THAT(run("log --db c.db --plan plan.csv --speed max").out, HasSubstr("0 of "));
 }
 
+/// Longer ones than the virtual calendar's five minutes, in one go and after a break.
+TEST_F(Chain, LongRunsOfTheVirtualRigDoNotOverlap) {
+  write_text(folder / "plan.csv",
+             "session,location,repeat,duration_s\nS1,OT,1,400\nS1,OT,2,1\nS1,OT,3,1\nS2,OT,4,1\n");
+  expect_well("log --db c.db --plan plan.csv --speed max");
+  expect_well("log --db c.db --location OT --repeat 5 --session S1 --duration 1 --speed max");
+  std::vector<double> starts_s;
+  for (const auto& run : CampaignFile(folder / "c.db", CampaignFile::Access::kRead).runs())
+    starts_s.push_back(run.start_s - 1772409600 - 8 * 3600);
+  EXPECT_THAT(starts_s, testing::ElementsAre(0, 460, 760, 86400, 1060));
+}
+
 /// An import brings names of its own, and raw files of its own.
 TEST_F(Chain, ALoggedRunHasANameThatNoImportedOneHas) {
   test::ExampleCampaign campaign;

@@ -161,6 +161,17 @@ TEST(CampaignFile, TransactionIsAllOrNothing) {
   EXPECT_TRUE(file.empty());
 }
 
+TEST(CampaignFile, SweepsUpKilledImportsAndNothingElse) {
+  const test::TemporaryFolder folder;
+  const std::vector<std::string> users = {"c.db.notes.part", "c.db..part",       "c.db.12a.part",
+                                          "c.db.part",       "c.db.12.part.old", "d.db.12.part"};
+  for (const std::string& name : users) std::ofstream(folder / name) << name;
+  std::ofstream(folder / "c.db.4711.part") << "half a campaign";
+  { const StagedCampaign staged(folder / "c.db", false); }
+  EXPECT_FALSE(std::filesystem::exists(folder / "c.db.4711.part"));
+  for (const std::string& name : users) EXPECT_TRUE(std::filesystem::exists(folder / name)) << name;
+}
+
 TEST(CampaignFile, NewestDocumentIsInForce) {
   const test::TemporaryFolder folder;
   CampaignFile file(folder / "c.db", Access::kRecord);

@@ -103,6 +103,9 @@ TEST(Observations, NamesWhatIsWrong) {
               HasSubstr("t.csv:1: the required column thrust is missing"));
   EXPECT_THAT(refusal(kSchema, "pole_count = 14\n", ""), HasSubstr("speed.pole_count is required"));
   EXPECT_THAT(refusal(kSchema, "pole_count = 14\n", "pole_count = 7\n"), HasSubstr("even number"));
+  for (const char* flag : {"electrical = false\n", "# electrical\n"})
+    EXPECT_THAT(refusal(kSchema, "electrical = true\n", flag),
+                HasSubstr("s.toml:16: speed.pole_count is of electrical speeds: write electrical = true"));
   EXPECT_THAT(refusal(kSchema, "diameter_column = \"D\"\n", "diameter_column = \"D\"\ndiameter_m = 0.2\n"),
               HasSubstr("write one of them"));
   EXPECT_THAT(refusal(kSchema, "diameter_unit = \"in\"", "diameter_unit = \"inch\""),

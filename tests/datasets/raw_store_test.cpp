@@ -1,6 +1,7 @@
 #include "datasets/raw_store.h"
 
 #include "datasets/error.h"
+#include "datasets/raw_key.h"
 #include "datasets/snapshot.h"
 #include "datasets/sqlite.h"
 #include "datasets/statistics_store.h"
@@ -184,6 +185,11 @@ TEST_F(RawStore, ASnapshotIsOfOneInstant) {
     EXPECT_EQ(ledger_of(reader, run.id)->frames_stored, 300u);
   }
   EXPECT_EQ(raw_run(reader, "R1")->frames, 500u);
+}
+
+TEST(RawKey, AFrameThatHasNoRoomIsRefused) {
+  EXPECT_LT(chunk_key(1, kLastFrame), chunk_key(2, 0));
+  EXPECT_THROW(chunk_key(1, kLastFrame + 1), StorageError) << "it would be run 2's first";
 }
 
 TEST_F(RawStore, RunsAreNamedOnce) {

@@ -72,7 +72,7 @@ const actions = [
     key: 'x',
     name: 'Stop',
     why: () => (controls.state.phase === 'recording' ? '' : 'No run is being recorded.'),
-    act: () => send('stop', {}, 'Stopped; the run is kept as partial.'),
+    act: () => send('stop', {run: controls.state.run}, 'Stopped; the run is kept as partial.'),
   },
   {
     key: 't',

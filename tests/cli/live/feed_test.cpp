@@ -193,6 +193,25 @@ TEST_F(Watched, ChannelsThatAreWrongAlarm) {
   EXPECT_EQ(feed.end(outcome), "clipping;overload;stuck;tare_drift");
 }
 
+/// Between a run's end and the next one's begin a stop would end the next one, or be forgotten.
+TEST_F(Watched, OnlyTheRunThatIsRecordedIsStopped) {
+  std::atomic<bool> stop = false;
+  const LiveRun run{.run = "R1", .location = "OT", .session = "S1"};
+  feed.know({});
+  EXPECT_EQ(feed.raise_in_run("R1", stop).phase, Phase::kIdle);
+  feed.begin(run);
+  EXPECT_EQ(feed.raise_in_run("R0", stop).run.run, "R1");
+  EXPECT_FALSE(stop) << "meant for the one before";
+  feed.raise_in_run("R1", stop);
+  EXPECT_TRUE(stop.exchange(false));
+  feed.raise_in_run("", stop);
+  EXPECT_TRUE(stop.exchange(false));
+  feed.end({});
+  EXPECT_NE(feed.position().phase, Phase::kRecording);
+  feed.raise_in_run("", stop);
+  EXPECT_FALSE(stop);
+}
+
 TEST(Disk, AFullOneIsLowToo) {
   constexpr std::uintmax_t kGB = 1'000'000'000;
   EXPECT_FALSE(is_low({})) << "not known yet";

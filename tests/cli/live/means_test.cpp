@@ -87,6 +87,24 @@ TEST(RunningMeans, SayNothingTooEarly) {
   EXPECT_FALSE(cold.means(frames_of(3000, 1)).c_t);
 }
 
+/// A plug that is out at the last tare is not the zero of what follows.
+TEST(Cells, ATareThatIsStuckIsNoZero) {
+  CampaignData data;
+  data.info = parse_campaign_toml(reference_campaign_toml(), "campaign.toml");
+  for (const char* name : {"T1", "T2"}) {
+    tunnelrig::Run& run = data.runs.emplace_back();
+    run.run = name;
+    run.session = "S1";
+    run.kind = RunKind::kTare;
+    data.raw[name] = {.run = name, .state = RunState::kComplete};
+    data.statistics[name].channels.resize(4, {.mean_V = 0.4, .lowest_V = 0.3, .highest_V = 0.5});
+  }
+  data.statistics["T2"].channels[1] = {};
+  const CellKnowledge::Tare tare = cells_of(data).tares.at("S1");
+  EXPECT_EQ(tare.mean_V[1], 0.4);
+  EXPECT_EQ(tare.drift_rotor, 0);
+}
+
 TEST(RunAlarms, AreFoundInAllOfTheRunsFrames) {
   const KnownRig rig;
   const double volts = rig.info.daq.volts_per_count();

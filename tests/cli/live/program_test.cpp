@@ -144,7 +144,10 @@ TEST_F(LivePage, SteersARecording) {
   EXPECT_EQ(log.command({{"command", "redo"}, {"run", "R0002"}}).status, 200);
   until_over(stream, "R0003");
   EXPECT_EQ(log.command({{"command", "start"}, {"location", "OT"}, {"duration_s", 60}}).status, 200);
-  EXPECT_EQ(log.command({{"command", "stop"}}).status, 200);
+  const auto late = log.command({{"command", "stop"}, {"run", "R0003"}});
+  EXPECT_EQ(late.status, 409) << "meant for the run before";
+  EXPECT_THAT(late.body, HasSubstr("R0004 is being recorded, not R0003"));
+  EXPECT_EQ(log.command({{"command", "stop"}, {"run", "R0004"}}).status, 200);
   until_over(stream, "R0004");
   EXPECT_EQ(log.command({{"command", "exclude"}, {"run", "R0001"}, {"reason", "motor ran"}}).status, 200);
   EXPECT_EQ(log.command({{"command", "include"}, {"run", "R0001"}}).status, 200);

@@ -203,7 +203,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadCommand{"{\"a\":", "a JSON object"}, BadCommand{"{}", "no such command"},
         BadCommand{R"({"command":"format"})", "no such command"},
         BadCommand{R"({"command":3})", "a text is expected"},
-        BadCommand{R"({"command":"stop","run":"R1"})", "stop has no such key"},
+        BadCommand{R"({"command":"next","run":"R1"})", "next has no such key"},
         BadCommand{R"({"command":"start","location":7})", "location: a text"},
         BadCommand{R"({"command":"start","location":"a\nb"})", "no control characters"},
         BadCommand{R"({"command":"start","location":" OT"})", "no blanks"},
@@ -224,6 +224,7 @@ TEST(Commands, AreRead) {
   EXPECT_EQ(start.repeat, 3);
   EXPECT_EQ(start.kind, RunKind::kTare);
   EXPECT_EQ(start.duration_s, 20);
+  EXPECT_EQ(parse_command(R"({"command":"stop","run":"R0007"})").run, "R0007");
   const Command metadata =
       parse_command(R"({"command":"metadata","values":{"speed_rpm":4998.5,"air_temperature_C":null}})");
   EXPECT_EQ(metadata.values.at("speed_rpm"), 4998.5);
