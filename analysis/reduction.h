@@ -81,8 +81,8 @@ struct Reduction {
 };
 
 /// Reduces every thrust run that can be; the others are left out by name, and so are tares that cannot be
-/// zeros. Throws InputError where no run can
-/// be, where raw runs have no calibration, and where a switched-on term lacks its measurement in some run.
+/// zeros. Throws InputError where no run can be, where raw runs have no calibration, and where a switched-on
+/// term lacks its measurement in some run.
 Reduction reduce_runs(const CampaignData& data, const ModelTerms& terms);
 
 /// Indices in CampaignData::runs of those of a kind whose means can be used: recorded whole, not excluded,
