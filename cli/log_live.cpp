@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <tuple>
 
 #include <fmt/format.h>
 
@@ -31,9 +30,6 @@ live::LiveSettings live_settings(const LogOptions& options, Logging& logging, st
     settings.metadata.emplace(column, options.*value);
   return settings;
 }
-
-/// What tells the runs of a plan apart.
-auto key_of(const PlannedRun& run) { return std::tie(run.session, run.kind, run.location, run.repeat); }
 
 /// The loop that logs: one run at a time, what the plan or the page says.
 class LiveLogging {
@@ -176,8 +172,7 @@ class LiveLogging {
       again.z_norm = old->z_norm;
     }
     for (const PlannedRun& planned : plan_)
-      if (key_of(planned) == std::tie(old->session, old->kind, old->location, old->repeat))
-        again.own = planned.own;
+      if (key_of(planned) == key_of(*old)) again.own = planned.own;
     record(again, &order);
     if (!complete_ || !old->excluded.empty()) return;
     exclude_run(logging_.file(), name, fmt::format("redone as {}", here_.run));

@@ -16,7 +16,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <set>
-#include <tuple>
 
 #include <fmt/format.h>
 
@@ -342,20 +341,17 @@ std::vector<PlannedRun> read_plan(const std::string& path) {
 }
 
 std::vector<PlannedRun> runs_left(const CampaignFile& file, const std::vector<PlannedRun>& plan) {
-  using Key = std::tuple<std::string, RunKind, std::string, int>;
   std::set<std::string> complete;
   for (const RawRun& raw : raw_runs(file)) {
     if (raw.state == RunState::kComplete) complete.insert(raw.run);
   }
-  std::set<Key> done;
+  std::set<RunKey> done;
   for (const Run& run : file.runs()) {
-    if (run.excluded.empty() && complete.contains(run.run))
-      done.emplace(run.session, run.kind, run.location, run.repeat);
+    if (run.excluded.empty() && complete.contains(run.run)) done.insert(key_of(run));
   }
   std::vector<PlannedRun> left;
   for (const PlannedRun& planned : plan) {
-    if (!done.contains(Key(planned.session, planned.kind, planned.location, planned.repeat)))
-      left.push_back(planned);
+    if (!done.contains(key_of(planned))) left.push_back(planned);
   }
   return left;
 }

@@ -12,7 +12,6 @@
 #include <random>
 #include <set>
 #include <string_view>
-#include <tuple>
 
 #include <fmt/ranges.h>
 
@@ -222,7 +221,7 @@ Sheet plan_sheet(const std::vector<PlannedRun>& plan) {
 
 std::vector<PlannedRun> parse_plan(const Sheet& sheet) {
   std::vector<PlannedRun> plan;
-  std::set<std::tuple<std::string, RunKind, std::string, int>> seen;
+  std::set<RunKey> seen;
   for (const char* column : {"session", "location", "repeat"}) sheet.require(column);
   for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
     PlannedRun run;
@@ -245,7 +244,7 @@ std::vector<PlannedRun> parse_plan(const Sheet& sheet) {
     run.y_norm = coordinate(sheet, row, "y_norm");
     run.z_norm = coordinate(sheet, row, "z_norm");
     check_both_or_neither(sheet, row, run.y_norm, run.z_norm);
-    if (!seen.emplace(run.session, run.kind, run.location, run.repeat).second) {
+    if (!seen.insert(key_of(run)).second) {
       throw InputError::at(sheet.file, sheet.rows[row].line, "session {}, {} {}, repeat {} is planned twice",
                            run.session, kind.empty() ? "thrust" : kind, run.location, run.repeat);
     }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -24,6 +25,13 @@ struct PlannedRun {
   std::optional<double> y_norm, z_norm;
   std::vector<std::pair<std::string, std::string>> own = {};  // columns of the user's, by name: cell
 };
+
+/// What tells runs apart: session, kind, location, repeat.
+using RunKey = std::tuple<std::string, RunKind, std::string, int>;
+template <class SomeRun>
+RunKey key_of(const SomeRun& run) {
+  return {run.session, run.kind, run.location, run.repeat};
+}
 
 /// A location to plan for; coordinates only where the label does not say them.
 struct PlannedLocation {

@@ -18,15 +18,14 @@ std::string with_target(std::string message, const std::string& staged, const st
   return message;
 }
 
-/// Whether two paths name one file or folder, which may not be there yet.
+}  // namespace
+
 bool same_place(const fs::path& a, const fs::path& b) {
   std::error_code error;
   if (fs::is_other(fs::status(a, error))) return false;
   return fs::weakly_canonical(fs::absolute(a, error), error) ==
          fs::weakly_canonical(fs::absolute(b, error), error);
 }
-
-}  // namespace
 
 void check_distinct(const NamedPaths& paths) {
   for (auto one = paths.begin(); one != paths.end(); ++one)

@@ -26,6 +26,9 @@ class FoldersForOutput {
 /// Options and the paths that they name, to be read or written; empty where they are not given.
 using NamedPaths = std::vector<std::pair<std::string, std::string>>;
 
+/// Whether two paths name one file or folder, which may not be there yet; of devices and pipes none does.
+bool same_place(const std::filesystem::path& a, const std::filesystem::path& b);
+
 /// Throws InputError naming both options where two of them name one file or folder: the second would be
 /// written over the first. Devices and pipes take both.
 void check_distinct(const NamedPaths& paths);

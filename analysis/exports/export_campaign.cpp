@@ -6,6 +6,7 @@
 #include "analysis/maps/tunnel_maps.h"
 #include "analysis/reduction_output.h"
 #include "datasets/error.h"
+#include "datasets/output_place.h"
 #include "datasets/snapshot.h"
 #include "datasets/staged_output.h"
 
@@ -53,14 +54,10 @@ std::unique_ptr<Writer> make_writer(Format format, const std::filesystem::path& 
 
 /// The campaign file, and the names beside it that SQLite and the recorder look for.
 void refuse_campaign_itself(const CampaignFile& file, const std::filesystem::path& target) {
-  std::error_code error;
-  const auto real = [&](const std::filesystem::path& path) {
-    return std::filesystem::weakly_canonical(path, error);
-  };
   std::vector<std::filesystem::path> own = files_of_campaign(file.path());
   for (const char* suffix : {".lock", ".part"}) own.emplace_back(file.path().string() + suffix);
   for (const auto& each : own) {
-    if (real(target) == real(each))
+    if (same_place(target, each))
       throw InputError::in(target.string(),
                            "is the campaign file itself, or one that belongs to it; export "
                            "to another name");

@@ -99,8 +99,7 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
     const HeldOutErrors predicted = left_out(observations, fit, rows);
     if (predicted.count() > 0) {
       errors = predicted;
-      explanation.noise_floor =
-          rms(predicted.error.array().isNaN().select(predicted.error, predicted.expected_std));
+      explanation.noise_floor = rms(predicted.expected_std);
     }
   }
   set_interval(observations, errors, {}, settings.seed, explanation.before);

@@ -132,20 +132,37 @@ class CurvesToTry {
       add(covariate, over,
           is_ratio(observations_, covariate) ? CurveShape::kLogStraight : CurveShape::kStraight, 1, rotors_,
           place);
+    const std::vector<Room> rooms = rooms_of(covariate);
     for (const CurveShape bend : bends_over(observations_, covariate, rows_))
-      add(covariate, over, bend, 1, with_room(covariate, 1));
-    for (const int count : kBends)
-      add(covariate, over, CurveShape::kWaves, count, with_room(covariate, count));
+      add(covariate, over, bend, 1, with_room(rooms, 1));
+    for (const int count : kBends) add(covariate, over, CurveShape::kWaves, count, with_room(rooms, count));
   }
 
-  /// The rotors whose own values lie close enough for so many waves. Where a whole one finds no row its
-  /// height is anything.
-  std::vector<int> with_room(const Covariate& covariate, int waves) const {
+  /// How close a rotor's own values lie.
+  struct Room {
+    int rotor, places;
+    double gap;
+  };
+
+  std::vector<Room> rooms_of(const Covariate& covariate) const {
+    std::vector<Room> rooms;
+    for (const int rotor : rotors_) {
+      if (!rooms.empty() && !covariate.per_channel()) {
+        rooms.push_back({rotor, rooms[0].places, rooms[0].gap});
+        continue;
+      }
+      const int places = places_on_range(covariate, rows_, rotor);
+      const bool varies = places >= 3 * kBends[1];  // or no gap is asked for
+      rooms.push_back({rotor, places, varies ? widest_gap(covariate, rows_, rotor) : 0});
+    }
+    return rooms;
+  }
+
+  /// The rotors with room for so many waves. Where a whole one finds no row its height is anything.
+  static std::vector<int> with_room(const std::vector<Room>& rooms, int waves) {
     std::vector<int> result;
-    for (const int rotor : rotors_)
-      if (3 * waves <= places_on_range(covariate, rows_, rotor) &&
-          (waves < kBends[1] || widest_gap(covariate, rows_, rotor) * waves <= 2))
-        result.push_back(rotor);
+    for (const auto& [rotor, places, gap] : rooms)
+      if (3 * waves <= places && (waves < kBends[1] || gap * waves <= 2)) result.push_back(rotor);
     return result;
   }
 

@@ -14,9 +14,8 @@ struct HeldOutErrors {
   std::vector<int> rows;
   Eigen::MatrixXd
       error;  // rows × channels, response's unit, predicted less measured; NaN where there is none
-  Eigen::MatrixXd
-      expected_std;          // what the error would scatter by if the mean model were exact, unit as above
-  Eigen::VectorXd whitened;  // V^(−½)e over all strata; 0 where there is none
+  Eigen::MatrixXd expected_std;  // what the error would scatter by if the mean model were exact, likewise
+  Eigen::VectorXd whitened;      // V^(−½)e over all strata; 0 where there is none
   double loss() const { return whitened.squaredNorm(); }  // eᵀV⁻¹e: what models are compared by
   Eigen::VectorXd amplitude;                              // of the columns, from the fit
 

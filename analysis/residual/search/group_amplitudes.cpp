@@ -127,7 +127,7 @@ JointFit fit_in_turns(Observations& observations, const MeanModel& model, const 
       const OwnResponse own =
           respond_in_groups(fit.model.terms[t], before.by_group, observations, before.acted_on);
       slopes.col(first + k) = own.derivative;
-      beyond.col(k) = own.value - before.amplitude.cwiseProduct(own.derivative);
+      beyond.col(k) = own.beyond(before.amplitude);
       settled &= (own.value - before.made).norm() <= kSettled * own.value.norm();
     }
     if (!slopes.allFinite() || !beyond.allFinite()) break;  // a force that has changed its sign

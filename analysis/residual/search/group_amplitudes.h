@@ -27,6 +27,11 @@ Eigen::VectorXd values_by_group(const Observations& observations,
 /// n: what a term does on these forces, with an amplitude for each group, and its derivative by that.
 struct OwnResponse {
   Eigen::VectorXd value, derivative;
+
+  /// What it does beside amplitude · derivative.
+  Eigen::VectorXd beyond(const Eigen::VectorXd& amplitude) const {
+    return value - amplitude.cwiseProduct(derivative);
+  }
 };
 OwnResponse respond_in_groups(Term term, const Eigen::VectorXd& amplitude, const Observations& observations,
                               const Eigen::MatrixXd& forces);

@@ -31,7 +31,7 @@ class Likelihoods {
     term_.parameters[parameter_] = std::exp(log_value);
     const OwnResponse own = respond_in_groups(term_, before_.by_group, own_, before_.acted_on);
     own_.slopes.col(own_.first_own_slope() + place_) = own.derivative;
-    own_.beyond.col(place_) = own.value - before_.amplitude.cwiseProduct(own.derivative);
+    own_.beyond.col(place_) = own.beyond(before_.amplitude);
     const LinearModel linear = linearise(own_, fit_.model, forces_);
     return place->second = CandidateScan(MixedModel(own_, rows_), linear.columns, {})
                                .null_fit(difference(response_components(own_), linear.offset))

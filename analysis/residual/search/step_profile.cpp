@@ -27,6 +27,71 @@ std::vector<int> possible_rows(const Observations& observations, const std::vect
   return {rows.begin() + before, rows.end() - behind + 1};
 }
 
+/// Of a step that begins at these rows, beside the rest of the model.
+class StepLikelihoods {
+ public:
+  StepLikelihoods(const Observations& given, const MeanModel& model, std::size_t t,
+                  const std::vector<int>& rows)
+      : rows_(rows),
+        step_(model.terms[t]),
+        own_column_(step_.per_group ? given.first_own_slope() + place_among_own(model, t) : -1),
+        fewer_(step_.per_group ? std::optional(without_own(given, model, t)) : std::nullopt),
+        without_(fewer_ ? *fewer_ : given) {
+    const MeanModel rest = model.without_term(t);
+    const Forces forces = predict_forces(without_, rest, rows);
+    linear_ = linearise(without_, rest, forces);
+    predicted_ = forces.predicted;
+    y_ = difference(response_components(without_), linear_.offset);
+    if (step_.per_group)
+      wide_ = given;
+    else
+      mixed_.emplace(without_, rows);
+  }
+
+  std::vector<double> operator()(std::vector<int>::const_iterator first,
+                                 std::vector<int>::const_iterator last) {
+    return step_.per_group ? in_groups(first, last) : alike(first, last);
+  }
+
+ private:
+  Components column_from(int row) {
+    step_.parameters[step_.effect->change_point().value()] = row;
+    return respond(step_, without_, predicted_).derivative[0];
+  }
+
+  std::vector<double> alike(std::vector<int>::const_iterator first, std::vector<int>::const_iterator last) {
+    std::vector<Candidate> candidates;
+    for (auto row = first; row != last; ++row) candidates.push_back({.columns = {column_from(*row)}});
+    std::vector<double> result;
+    for (const CandidateFit& fit : CandidateScan(*mixed_, linear_.columns, candidates).fit(y_))
+      result.push_back(fit.likelihood_ratio);
+    return result;
+  }
+
+  /// There may be more groups than a candidate has columns: the step stands in the baseline.
+  std::vector<double> in_groups(std::vector<int>::const_iterator first,
+                                std::vector<int>::const_iterator last) {
+    std::vector<double> result;
+    for (auto row = first; row != last; ++row) {
+      wide_->slopes.col(own_column_) = column_from(*row)[0];
+      result.push_back(
+          CandidateScan(MixedModel(*wide_, rows_), linear_.columns, {}).null_fit(y_).log_likelihood);
+    }
+    return result;
+  }
+
+  const std::vector<int>& rows_;
+  Term step_;
+  Index own_column_;
+  const std::optional<Observations> fewer_;
+  const Observations& without_;       // the step's own columns
+  std::optional<Observations> wide_;  // with them
+  std::optional<MixedModel> mixed_;   // of `without_`
+  LinearModel linear_;
+  Eigen::MatrixXd predicted_;
+  Components y_;
+};
+
 }  // namespace
 
 int first_row_of(const Term& step) {
@@ -54,40 +119,7 @@ StepProfile step_profile(const Observations& given, const MeanModel& model, std:
   const std::vector<int> possible = possible_rows(given, rows);
   StepProfile profile;
   if (possible.empty()) return profile;
-  Term step = model.terms[t];
-  std::optional<Observations> fewer;
-  if (step.per_group) fewer = without_own(given, model, t);
-  const Observations& observations = fewer ? *fewer : given;
-  const MeanModel rest = model.without_term(t);
-  const Forces forces = predict_forces(observations, rest, rows);
-  const LinearModel linear = linearise(observations, rest, forces);
-  const Components y = difference(response_components(observations), linear.offset);
-  const auto column_from = [&](int row) {
-    step.parameters[step.effect->change_point().value()] = row;
-    return respond(step, observations, forces.predicted).derivative[0];
-  };
-  const MixedModel mixed(observations, rows);
-  const auto alike = [&](auto first, auto last) {
-    std::vector<Candidate> candidates;
-    for (auto row = first; row != last; ++row) candidates.push_back({.columns = {column_from(*row)}});
-    std::vector<double> result;
-    for (const CandidateFit& fit : CandidateScan(mixed, linear.columns, candidates).fit(y))
-      result.push_back(fit.likelihood_ratio);
-    return result;
-  };
-  Observations wide =
-      given;  // there may be more groups than a candidate has columns: it stands in the baseline
-  const auto in_groups = [&](auto first, auto last) {
-    std::vector<double> result;
-    for (auto row = first; row != last; ++row) {
-      wide.slopes.col(given.first_own_slope() + place_among_own(model, t)) = column_from(*row)[0];
-      result.push_back(CandidateScan(MixedModel(wide, rows), linear.columns, {}).null_fit(y).log_likelihood);
-    }
-    return result;
-  };
-  const auto evaluate = [&](auto first, auto last) {
-    return step.per_group ? in_groups(first, last) : alike(first, last);
-  };
+  StepLikelihoods evaluate(given, model, t, rows);
   auto from = std::lower_bound(possible.begin(), possible.end(), first_row_of(model.terms[t]));
   auto to = from;
   const auto goes_on = [&](bool up) {

@@ -37,6 +37,24 @@ MatrixXd normal(Index rows, Index columns, std::mt19937_64& random) {
   return MatrixXd::NullaryExpr(rows, columns, [&] { return draw(random); });
 }
 
+/// Each block a group of its own.
+void make_blocks_groups(Observations& o) {
+  o.group = o.block;
+  o.group_name = o.block_name;
+  o.groups_within_blocks = true;
+}
+
+double mean_square_over_expected(const HeldOutErrors& errors) {
+  const auto z = (errors.error.array() / errors.expected_std.array()).eval();
+  return z.isNaN().select(0, z).square().sum() / static_cast<double>(errors.count());
+}
+
+/// The mean of values that are 1 on the average, to four standard errors.
+void expect_near_1(const VectorXd& values) {
+  const double spread = (values.array() - values.mean()).matrix().norm();
+  EXPECT_NEAR(values.mean(), 1, 4 * spread / static_cast<double>(values.size()));
+}
+
 struct HeldOut : testing::TestWithParam<int> {};
 
 TEST_P(HeldOut, ErrorsAreThoseOfDirectLeastSquares) {
@@ -147,7 +165,7 @@ TEST_P(HeldOut, ExpectedScatterCoversTheErrors) {
 TEST_P(HeldOut, ExpectedScatterOfAGroupsOwnBaselineKnowsItsNeighbours) {
   std::mt19937_64 random(test::seed() + 8);
   constexpr int kTables = 300;
-  VectorXd of_table(kTables);  // mean square of error over expected
+  VectorXd of_table(kTables);
   for (int i = 0; i < kTables; ++i) {
     Observations o = test::simulate({.runs_of_block = std::vector<int>(9, 8),
                                      .groups = 1,
@@ -155,21 +173,14 @@ TEST_P(HeldOut, ExpectedScatterOfAGroupsOwnBaselineKnowsItsNeighbours) {
                                      .session_ratio = 0,
                                      .run_correlation = 0.8},
                                     random);
-    o.group = o.block;
-    o.group_name = o.block_name;
-    o.groups_within_blocks = true;
+    make_blocks_groups(o);
     o.scatter.run_correlation = {0.8, 0.8};
     const Split split = split_blocks(o);
     const HeldOutErrors errors =
         predict_held_out(o, {o.y}, {}, known_variances(o, 0.002, 0), split.fit, split.test);
-    double of_this = 0;
-    for (Index k = 0; k < errors.error.size(); ++k)
-      if (const double error = errors.error.data()[k]; !std::isnan(error))
-        of_this += std::pow(error / errors.expected_std.data()[k], 2);
-    of_table(i) = of_this / static_cast<double>(errors.count());
+    of_table(i) = mean_square_over_expected(errors);
   }
-  const double spread = (of_table.array() - of_table.mean()).matrix().norm();
-  EXPECT_NEAR(of_table.mean(), 1, 4 * spread / kTables);
+  expect_near_1(of_table);
 }
 
 /// And its errors have those of the amplitudes, of which the group's own constant takes up none that vary in
@@ -177,27 +188,20 @@ TEST_P(HeldOut, ExpectedScatterOfAGroupsOwnBaselineKnowsItsNeighbours) {
 TEST_P(HeldOut, ExpectedScatterOfAGroupsOwnBaselineHasTheAmplitudes) {
   std::mt19937_64 random(test::seed() + 9);
   constexpr int kTables = 300;
-  VectorXd of_table(kTables);  // mean square of error over expected
+  VectorXd of_table(kTables);
   for (int i = 0; i < kTables; ++i) {
     Observations o = test::simulate(
         {.runs_of_block = std::vector<int>(6, 6), .groups = 1, .channels = GetParam(), .session_ratio = 0},
         random);
-    o.group = o.block;
-    o.group_name = o.block_name;
-    o.groups_within_blocks = true;
+    make_blocks_groups(o);
     const Split split = split_blocks(o);
     MatrixXd column = normal(o.rows(), GetParam(), random);
     column(split.test, Eigen::all) *= 5;  // far beyond what the fit has seen
     const HeldOutErrors errors =
         predict_held_out(o, {o.y}, {{column}}, known_variances(o, 0.002, 0), split.fit, split.test);
-    double of_this = 0;
-    for (Index k = 0; k < errors.error.size(); ++k)
-      if (const double error = errors.error.data()[k]; !std::isnan(error))
-        of_this += std::pow(error / errors.expected_std.data()[k], 2);
-    of_table(i) = of_this / static_cast<double>(errors.count());
+    of_table(i) = mean_square_over_expected(errors);
   }
-  const double spread = (of_table.array() - of_table.mean()).matrix().norm();
-  EXPECT_NEAR(of_table.mean(), 1, 4 * spread / kTables);
+  expect_near_1(of_table);
 }
 
 /// Runs that one of two models has no errors of are no runs that it predicts without error.
@@ -206,9 +210,7 @@ TEST_P(HeldOut, ModelsAreComparedByRunsThatBothPredict) {
   Observations o = test::simulate(
       {.runs_of_block = std::vector<int>(6, 4), .groups = 1, .channels = GetParam(), .session_ratio = 0},
       random);
-  o.group = o.block;
-  o.group_name = o.block_name;
-  o.groups_within_blocks = true;
+  make_blocks_groups(o);
   const auto left_out_errors = [&](const Observations& model) {
     return cross_validate(model, {model.y}, {}, known_variances(model, 0.002, 0), model.all_rows());
   };
