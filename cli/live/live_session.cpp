@@ -25,6 +25,9 @@ std::string own_name() {
 LiveSession::LiveSession(LiveSettings settings, std::atomic<bool>& stop)
     : settings_(std::move(settings)),
       server_(std::make_unique<HttpServer>(settings_.address, settings_.port)) {
+  // New viewers are told in the order in which things were first said: before feed and book say anything.
+  viewers_.tell("alarms", R"({"active":[]})");
+  say_hello();
   feed_ = std::make_unique<LiveFeed>(settings_.info, settings_.campaign, viewers_, running_means);
   book_ = std::make_unique<Book>(BookSettings{settings_.campaign, settings_.plan, !settings_.writable},
                                  viewers_, *feed_);
@@ -36,8 +39,6 @@ LiveSession::LiveSession(LiveSettings settings, std::atomic<bool>& stop)
                                               .token = random_token(),
                                               .page = page_html()},
                                  [this](const Command& command) { return execute(command); });
-  viewers_.tell("alarms", R"({"active":[]})");
-  say_hello();
   server_->serve(*site_, viewers_);
 }
 
@@ -71,7 +72,8 @@ void LiveSession::say_hello() {
             {"writable", settings_.writable},
             {"metadata", Json::array()}};
   auto values = settings_.metadata;
-  for (const auto& [name, value] : desk_->metadata()) values[name] = value;
+  if (desk_)
+    for (const auto& [name, value] : desk_->metadata()) values[name] = value;
   for (const MetadataField& field : kMetadata) {
     const auto found = values.find(field.name);
     const auto [low, high] = range_of(field.name).value();
