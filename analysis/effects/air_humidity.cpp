@@ -29,6 +29,7 @@ std::vector<Effect> air_humidity() {
       .parameters = {{"exponent", "1", 0, 4, ParameterRole::kAmplitude, {}, 1.0}},
       .covariates = {"relative_humidity", "air_temperature_C"},
       .scope = EffectScope::kShared,
+      .origin = EffectOrigin::kAirHumidity,
       .sign_rule = "thrust falls with humidity",
       .force_N = {},
       .jet_N = {},

@@ -25,6 +25,7 @@ std::vector<Effect> air_pressure() {
       .parameters = {{"exponent", "1", 0, 3, ParameterRole::kAmplitude, {}, 1.0}},
       .covariates = {"air_pressure_Pa"},
       .scope = EffectScope::kShared,
+      .origin = EffectOrigin::kAirPressure,
       .sign_rule = "thrust grows with pressure",
       .force_N = {},
       .jet_N = {},

@@ -26,6 +26,7 @@ std::vector<Effect> air_temperature() {
       .parameters = {{"exponent", "1", 0, 3, ParameterRole::kAmplitude, {}, 1.0}},
       .covariates = {"air_temperature_C"},
       .scope = EffectScope::kShared,
+      .origin = EffectOrigin::kAirTemperature,
       .sign_rule = "thrust falls with temperature",
       .force_N = {},
       .jet_N = {},

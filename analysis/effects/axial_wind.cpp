@@ -22,6 +22,7 @@ std::vector<Effect> axial_wind() {
       .parameters = {{"coefficient", "s2/m2", -0.1, 0.1}},
       .covariates = {"tunnel_airspeed_m_s"},
       .scope = EffectScope::kShared,
+      .origin = EffectOrigin::kWind,
       .sign_rule = "either",
       .force_N = {},
       .jet_N = {},

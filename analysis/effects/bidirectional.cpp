@@ -22,6 +22,8 @@ std::vector<Effect> bidirectional() {
       .parameters = {{"asymmetry", "1", -0.5, 0.5}},
       .covariates = {},
       .scope = EffectScope::kRotor,
+      .origin = EffectOrigin::kCharacteristic,
+      .needs_both_signs = true,
       .sign_rule = "either",
       .force_N = {},
       .jet_N = {},

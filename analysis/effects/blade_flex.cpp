@@ -23,6 +23,7 @@ std::vector<Effect> blade_flex() {
       .parameters = {{"coefficient", "1", -0.5, 0.5}},
       .covariates = {"speed_rpm"},
       .scope = EffectScope::kRotor,
+      .rare = true,
       .sign_rule = "either",
       .force_N = {},
       .jet_N = {},

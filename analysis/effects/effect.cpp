@@ -12,9 +12,7 @@ bool Effect::within_time() const {
                      [](const std::string& column) { return column == "time_since_motor_start_s"; });
 }
 
-std::string Effect::cause() const {
-  return name == "crosstalk" && !form.empty() ? name + " (" + form + ")" : name;
-}
+std::string Effect::cause() const { return form_is_axis ? name + " (" + form + ")" : name; }
 
 std::string Effect::label(int rotor, int from) const {
   std::string text = name;

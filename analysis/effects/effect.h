@@ -64,6 +64,19 @@ enum class EffectScope {
   kPair,    // from one rotor's cell into another's
 };
 
+/// What makes it, where that says of which responses an effect can be tried.
+enum class EffectOrigin {
+  kAny,             // no rule but its conditions
+  kAirPressure,     // the density of the air
+  kAirTemperature,  // the same
+  kAirHumidity,     // the same
+  kCellInAir,       // the temperature of a cell, for which the air's stands
+  kWind,            // air that passes through a rotor
+  kSpeedSquared,    // the law by which forces go with the rotor's speed
+  kCharacteristic,  // what a cell makes of the force alone
+  kOffset,          // a constant beside the force
+};
+
 struct Effect {
   std::string name;     // as docs/effects.md lists it; forms of one effect share it
   std::string form;     // which form; empty where there is one
@@ -72,13 +85,18 @@ struct Effect {
   std::vector<EffectParameter> parameters;
   std::vector<std::string> covariates;  // columns of runs.csv, or derived ones (docs/effects.md)
   EffectScope scope = EffectScope::kShared;
+  EffectOrigin origin = EffectOrigin::kAny;
   bool tunnel_only = false;  // acts at tunnel locations only
   bool theory_only = false;  // the amplitude is theory's whenever the effect is adopted
   bool additive = false;     // adds a force, where others scale it
   bool of_reading = false;   // scales what a cell reads, whatever load makes it read so
   bool of_zero = false;      // is in the tares as well, which take it off
   bool needs_previous = false;
-  std::string sign_rule;  // what the bounds of the amplitude mean, in words
+  bool needs_both_signs = false;  // of the force
+  bool needs_diameters = false;   // of a table's propellers, which differ from row to row
+  bool form_is_axis = false;      // its form names a table's axis that leaks into the response
+  bool rare = false;              // another of the same condition is the likelier cause by far
+  std::string sign_rule;          // what the bounds of the amplitude mean, in words
 
   std::function<double(const Sample&, const double*, double)> force_N;
   std::function<EffectJet(const Sample&, const EffectJet*, const EffectJet&)> jet_N;
@@ -86,6 +104,10 @@ struct Effect {
   bool within_time() const;                         // changes within a run
   std::optional<std::size_t> change_point() const;  // the parameter that says at which run it begins
   bool has_change_point() const { return change_point().has_value(); }
+  bool of_other_axis() const { return form_is_axis || scope == EffectScope::kPair; }
+  bool of_force_alone() const {
+    return covariates.empty() && scope != EffectScope::kPair && !needs_previous && !has_change_point();
+  }
   /// What it says the cause is: its name, whatever its form; of a table's other axes the axis as well.
   std::string cause() const;
   /// "crosstalk from rotor 1 to rotor 2"; rotors from 0, −1: of all, from none.

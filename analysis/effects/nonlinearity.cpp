@@ -22,6 +22,7 @@ std::vector<Effect> nonlinearity() {
       .parameters = {{"coefficient", "1/N", -0.01, 0.01}},
       .covariates = {},
       .scope = EffectScope::kRotor,
+      .origin = EffectOrigin::kCharacteristic,
       .sign_rule = "either",
       .force_N = {},
       .jet_N = {},

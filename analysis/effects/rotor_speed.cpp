@@ -25,6 +25,7 @@ std::vector<Effect> rotor_speed() {
       .parameters = {{"exponent", "1", 0, 4, ParameterRole::kAmplitude, {}, 2.0}},
       .covariates = {"speed_rpm"},
       .scope = EffectScope::kShared,
+      .origin = EffectOrigin::kSpeedSquared,
       .theory_only = true,
       .sign_rule = "thrust grows with speed",
       .force_N = {},

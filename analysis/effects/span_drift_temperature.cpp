@@ -35,6 +35,7 @@ std::vector<Effect> span_drift_temperature() {
           .parameters = {{"coefficient", "1/K", -0.02, 0.02}},
           .covariates = {"air_temperature_C"},
           .scope = EffectScope::kRotor,
+          .origin = EffectOrigin::kCellInAir,
           .sign_rule = "either",
           .force_N = {},
           .jet_N = {},

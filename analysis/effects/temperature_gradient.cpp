@@ -22,6 +22,7 @@ std::vector<Effect> temperature_gradient() {
       .parameters = {{"coefficient", "V/K", -0.05, 0.05}},
       .covariates = {"cell_temperature_C", "air_temperature_C"},
       .scope = EffectScope::kRotor,
+      .origin = EffectOrigin::kCellInAir,
       .additive = true,
       .of_zero = true,
       .sign_rule = "either",

@@ -37,6 +37,7 @@ std::vector<Effect> tip_mach() {
       .parameters = {{"exponent", "1", 0, 2}},
       .covariates = {"speed_rpm", "air_temperature_C"},
       .scope = EffectScope::kShared,
+      .needs_diameters = true,
       .sign_rule = "thrust grows with the tip Mach number",
       .force_N = {},
       .jet_N = {},

@@ -36,6 +36,7 @@ std::vector<Effect> zero_drift_temperature() {
               .parameters = {{"coefficient", "V/K", -0.05, 0.05}},
               .covariates = {"air_temperature_C"},
               .scope = EffectScope::kRotor,
+              .origin = EffectOrigin::kCellInAir,
               .additive = true,
               .of_zero = true,
               .sign_rule = "either",

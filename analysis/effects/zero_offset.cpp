@@ -22,6 +22,7 @@ std::vector<Effect> zero_offset() {
       .parameters = {{"offset", "V", -2, 2}},
       .covariates = {},
       .scope = EffectScope::kRotor,
+      .origin = EffectOrigin::kOffset,
       .additive = true,
       .sign_rule = "either",
       .force_N = {},

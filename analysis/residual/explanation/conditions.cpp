@@ -1,5 +1,6 @@
 // What the conditions of the runs cannot show.
 #include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/likelihood/candidates.h"
 #include "analysis/residual/observations/condition_values.h"
 
 #include <algorithm>

@@ -83,7 +83,7 @@ void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd
   const Eigen::ArrayXd log_speed = speed->value.col(0).array().log() - speed->value.array().log().mean();
   for (AdoptedEffect& adopted : explanation.adopted) {
     const auto& names = adopted.term.effect->covariates;
-    if (adopted.term.effect->name == "rotor_speed" ||
+    if (adopted.term.effect->origin == EffectOrigin::kSpeedSquared ||
         std::find(names.begin(), names.end(), "speed_rpm") == names.end())
       continue;
     const Index channel = std::max(adopted.term.rotor, 0);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "analysis/residual/explanation/seal.h"
+#include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/search/attribution.h"
 #include "analysis/residual/search/group_amplitudes.h"
 

@@ -30,6 +30,7 @@ std::vector<Effect> other_axes(const Observations& observations) {
                                               .parameters = {{"coefficient", unit, -1e12, 1e12}},
                                               .covariates = {axis},
                                               .additive = true,
+                                              .form_is_axis = true,
                                               .sign_rule = "either",
                                               .force_N = {},
                                               .jet_N = {}}));
@@ -54,7 +55,7 @@ std::optional<Effect> bounded_as_here(const Effect& effect, const Observations& 
   for (EffectParameter& parameter : own.parameters) {
     const bool in_volts = parameter.in_volts() && observations.unit != "V";
     const bool per_newton = parameter.per_newton() && observations.unit != "N";
-    if (in_volts) bound_by(effect.name == "zero_offset" ? most_read : kNoBound, parameter);
+    if (in_volts) bound_by(effect.origin == EffectOrigin::kOffset ? most_read : kNoBound, parameter);
     if (per_newton)
       bound_by(kMostBent / (observations.value.maxCoeff() - observations.value.minCoeff()), parameter);
     differs |= in_volts || per_newton;

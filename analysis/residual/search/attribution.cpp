@@ -1,3 +1,5 @@
+#include "analysis/residual/likelihood/candidates.h"
+#include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/search/search.h"
 
 #include <algorithm>

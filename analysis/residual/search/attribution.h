@@ -2,7 +2,6 @@
 // protocol.
 #pragma once
 
-#include "analysis/residual/likelihood/candidates.h"
 #include "analysis/residual/likelihood/joint_fit.h"
 
 #include <cstdint>

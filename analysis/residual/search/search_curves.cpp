@@ -1,4 +1,5 @@
 // Structure without a name.
+#include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/observations/condition_values.h"
 #include "analysis/residual/search/null_maxima.h"
 #include "analysis/residual/search/search.h"

@@ -1,4 +1,5 @@
 // Named effects: ranked, tried, accepted one by one.
+#include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/search/null_maxima.h"
 #include "analysis/residual/search/search.h"
 #include "calibration/distributions.h"
@@ -25,8 +26,8 @@ double prior_weight(const Term& term, const Observations& observations, std::siz
   const Effect& effect = *term.effect;
   double weight = effect.theory() ? kKnownPhysicsWeight : 1;
   // Of a C_T that goes with the speed a cell that bends as much is the rarest cause.
-  const bool bent_cell = effect.name == "nonlinearity" && observations.coefficient;
-  if (effect.name == "blade_flex" || bent_cell) weight /= kRareWeight;
+  const bool bent_cell = effect.origin == EffectOrigin::kCharacteristic && observations.coefficient;
+  if (effect.rare || bent_cell) weight /= kRareWeight;
   if (effect.scope == EffectScope::kRotor && term.rotor >= 0) weight /= 4;
   if (effect.scope == EffectScope::kPair) weight /= 12;
   if (effect.has_change_point()) weight /= std::max<double>(1, static_cast<double>(ways));
@@ -49,11 +50,10 @@ void Search::add_effects() {
 
 bool Search::already_in(const Term& way, const MeanModel& model) {
   return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
-    const bool another_axis = way.effect->name == "crosstalk" && term.effect != way.effect;
     const bool another_step =
         way.effect->has_change_point() && !std::equal(way.parameters.begin() + 1, way.parameters.end(),
                                                       term.parameters.begin() + 1, term.parameters.end());
-    return term.effect->name == way.effect->name && !another_axis && !another_step &&
+    return term.effect->cause() == way.effect->cause() && !another_step &&
            (term.rotor == way.rotor || way.rotor < 0) && term.other == way.other;
   });
 }

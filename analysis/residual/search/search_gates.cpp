@@ -1,4 +1,5 @@
 // What a candidate beyond chance must not be, to get its name.
+#include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/search/group_amplitudes.h"
 #include "analysis/residual/search/search.h"
 #include "analysis/residual/search/step_profile.h"
@@ -16,11 +17,11 @@ using Eigen::Index;
 bool Search::lacks_speed_squared(const Term& term) const {
   const auto& covariates = term.effect->covariates;
   const bool of_speed = std::find(covariates.begin(), covariates.end(), "speed_rpm") != covariates.end();
-  const auto is_square = [](const Term& way) { return way.effect->name == "rotor_speed"; };
+  const auto is_square = [](const Term& way) { return way.effect->origin == EffectOrigin::kSpeedSquared; };
   const bool has_none = !observations_.from_table || std::ranges::any_of(ways_, is_square);
-  return has_none && of_speed && term.effect->name != "rotor_speed" &&
+  return has_none && of_speed && !is_square(term) &&
          std::none_of(result_.accepted.begin(), result_.accepted.end(),
-                      [](const Accepted& accepted) { return accepted.term.effect->name == "rotor_speed"; });
+                      [&](const Accepted& accepted) { return is_square(accepted.term); });
 }
 
 std::optional<std::string> Search::only_bends(const Term& term, const NullFit& variances,

@@ -22,7 +22,7 @@ void Search::add_together(Scan& scan, const std::vector<std::size_t>& ways, doub
 void Search::add_several_axes(Scan& scan) const {
   std::vector<std::size_t> axes;
   for (std::size_t i = 0; i < scan.ways.size(); ++i)
-    if (scan.ways[i].effect->name == "crosstalk" && !scan.ways[i].per_group) axes.push_back(i);
+    if (scan.ways[i].effect->of_other_axis() && !scan.ways[i].per_group) axes.push_back(i);
   constexpr std::size_t kMostAxes = 24;  // more channels are no cell's
   if (axes.size() > kMostAxes) return;
   const double pairs = static_cast<double>(axes.size() * (axes.size() - 1)) / 2;

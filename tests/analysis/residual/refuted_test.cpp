@@ -1,5 +1,6 @@
 // Names that do not stand: the seal refutes them, curves undo them, or they say what another column says.
 #include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/likelihood/candidates.h"
 #include "analysis/residual/likelihood/curves.h"
 #include "analysis/residual/tables.h"
 

@@ -1,6 +1,7 @@
 // What a term does to runs, and which ways there are to try an effect.
 #include "analysis/residual/likelihood/candidates.h"
 #include "analysis/residual/likelihood/joint_fit.h"
+#include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 
