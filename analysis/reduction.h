@@ -56,7 +56,7 @@ struct RunCoefficients {
 
 struct LeftOutRun {
   std::string run, reason;
-  bool problem = true;  // false: nothing that needs mending (a partial recording)
+  bool problem = true;  // false: nothing that needs mending (excluded, a partial recording)
 };
 
 /// The version of the model that the thrusts were corrected by; version 0 is the thesis's, without

@@ -22,7 +22,7 @@ struct CalibrationLimits {
   double effect_percent_of_span = 0.1;  // largest deviation, the quadratic term's bow, hysteresis
   double residual_percent_of_span = 2;  // residual standard deviation
   double change_percent_of_span = 0.5;  // zero return, creep
-  double force_u95_percent = 1;         // of a force in the middle of the range, from the line alone
+  double force_u95_percent = 1;  // of the largest force, at the middle of the range, from the line alone
 };
 
 struct CalibrationOptions {

@@ -158,8 +158,19 @@ void check_tuned(const std::vector<std::string>& names) {
   }
 }
 
+/// A file of gains is written anew: those of controllers that are not tuned now would be gone.
+void check_none_lost(const FlyOptions& options) {
+  if (options.controllers.empty() || !std::filesystem::exists(options.tune)) return;
+  for (const auto& [name, gains] : parse_gains(read_text(options.tune), options.tune))
+    if (std::ranges::count(options.controllers, name) == 0)
+      throw InputError(
+          fmt::format("{}: has gains of {}, which are not tuned now and would be lost; write to another file",
+                      options.tune, name));
+}
+
 int tune_all(const FlyOptions& options) {
   check_tuned(options.controllers);
+  check_none_lost(options);
   const NamedMap map = map_of(options);
   TuningSettings settings{.budget = options.budget, .workers = options.workers};
   std::vector<Tuned> tuned;

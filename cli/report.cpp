@@ -75,7 +75,7 @@ void add_report(CLI::App& app, Work& work) {
   verb->add_option("--out", options->out, "The page (.html)");
   verb->add_option("--figures", options->figures,
                    "Folder for the paper's figures, a file each, with captions");
-  verb->add_option("--format", options->format, "Of the figures; fonts are embedded in pdf")
+  verb->add_option("--format", options->format, "Of the figures; fonts are embedded in pdf and svg")
       ->check(CLI::IsMember({"pdf", "svg", "png"}))
       ->capture_default_str();
   verb->add_option("--width-mm", options->width_mm,

@@ -23,6 +23,13 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
+/// A header that ends with CR alone would have all rows in it.
+void require_line_feeds(std::string_view text, const std::string& file) {
+  const auto first = text.find('\r');
+  if (first < text.find('\n') && first + 1 < text.size() && text[first + 1] != '\n')
+    throw InputError::in(file, "its lines end with CR alone; save it with LF or CR LF");
+}
+
 /// Splits CSV text into records of cells; one call of `record` reads up to the end of one record.
 class Scanner {
  public:
@@ -227,6 +234,7 @@ Sheet parse_csv(std::string_view text, const std::string& file, std::string_view
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   check_encoding(text, file);
   Sheet sheet{.file = file, .columns = {}, .rows = {}};
+  require_line_feeds(text, file);
   Scanner scanner(text, file);
   if (scanner.at_end()) throw InputError::at(file, 1, "the file is empty; a header row is required");
   sheet.columns = scanner.record();

@@ -21,9 +21,9 @@ bool adoptable(const Observations& observations);
 /// what is asked of `adopt`, before hours are spent on an explanation.
 void require_adoptable(const Observations& observations);
 
-/// The accepted effects, and with `empirical` the curves that have no name. Variances of effects are those of
-/// the explanation's 95 % intervals, correlations those of the linearised joint fit; what theory gives has
-/// none.
+/// The accepted effects, and with `empirical` the curves that have no name. Standard errors, and what
+/// parameters of one effect share, are the explanation's jackknife's; correlations between effects those of
+/// the linearised joint fit; what theory gives has none.
 Adoption adopt(const Observations& observations, const Explanation& explanation, bool empirical);
 
 }  // namespace tunnelrig

@@ -198,6 +198,9 @@ TEST_F(Fly, OtherBadOptionsAreRefused) {
   for (const char* name : {"lqr", "pid-stock"})
     EXPECT_THAT(refusal(std::string("--tune tuned.toml --controllers ") + name), HasSubstr(name));
   EXPECT_FALSE(std::filesystem::exists(folder / "tuned.toml"));
+  write_text(folder / "of_two.toml", "format = \"tunnelrig-gains/1\"\n[ibs]\nk1_y = 3\n[pid]\nposz_p = 4\n");
+  EXPECT_THAT(refusal("--tune of_two.toml --controllers ibs"),
+              HasSubstr("has gains of pid, which are not tuned"));
   EXPECT_THAT(refusal("--position guessed"), HasSubstr("must be lidar, lidar-thesis or given"));
   EXPECT_THAT(refusal("--motor-loss 0.9"), HasSubstr("motor_loss"));
   EXPECT_THAT(refusal("--payload-kg nan"), HasSubstr("--payload-kg nan: a number is required"));

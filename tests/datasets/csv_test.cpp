@@ -36,6 +36,8 @@ TEST(Csv, TakesWindowsLineEndsAndByteOrderMark) {
 
 TEST(Csv, NamesFileLineAndColumnOfWhatIsWrong) {
   EXPECT_THAT(message_of([] { parse_csv("", "t.csv"); }), HasSubstr("t.csv:1: the file is empty"));
+  EXPECT_THAT(message_of([] { parse_csv("a,b\r1,2\r3,4\r\n", "t.csv"); }),
+              HasSubstr("t.csv: its lines end with CR alone"));
   EXPECT_THAT(message_of([] { parse_csv("a,a\n", "t.csv"); }), HasSubstr("column a stands twice"));
   EXPECT_THAT(message_of([] { parse_csv("a,b\n1,2\n1\n", "t.csv"); }),
               HasSubstr("t.csv:3: 1 cells where the header has 2"));

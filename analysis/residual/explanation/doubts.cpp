@@ -52,24 +52,26 @@ void warn_of_doubts(Explanation& explanation) {
         "the noise floor is above all of the error's interval: the sealed blocks are calm by chance (in one "
         "campaign of twenty-five without any fault), or the rows scatter less evenly than its variances can "
         "follow, and it is too high");
+  const SealedErrors& sealed = explanation.sealed;
   const bool worse = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
-  if (const SealedErrors& sealed = explanation.sealed;
-      worse && sealed.all < std::min(sealed.curves, explanation.before.held_out_rmse))
+  if (worse && sealed.all < std::min(sealed.curves, explanation.before.held_out_rmse)) {
     explanation.warnings.push_back(
         fmt::format("on the sealed blocks the error is larger with the names alone than without; beside the "
                     "curves they make it smaller ({:.4g}, without them {:.4g}): adopt them together "
                     "(--adopt-empirical)",
                     sealed.all, sealed.curves));
-  else if (explanation.sealed.beyond_floor)
+    return;
+  }
+  if (sealed.beyond_floor)
     explanation.warnings.push_back(
         fmt::format("on the sealed blocks the error with all that was found is {:.2g} times the noise floor: "
                     "something else varies there",
-                    explanation.sealed.all / explanation.noise_floor));
-  else if (worse && (explanation.sealed.against_adopted ||
-                     is_worse(explanation.after.held_out_rmse, explanation.before.held_out_rmse)))
+                    sealed.all / explanation.noise_floor));
+  if (worse &&
+      (sealed.against_adopted || is_worse(explanation.after.held_out_rmse, explanation.before.held_out_rmse)))
     explanation.warnings.emplace_back(
         "on the sealed blocks the error is larger with what was adopted than without: doubt it");
-  else if (worse)
+  else if (worse && !sealed.beyond_floor)
     explanation.warnings.emplace_back(
         "on the sealed blocks what was adopted does little: that the error is larger with it than without is "
         "chance, and says neither that it is right nor that it is wrong");

@@ -227,9 +227,11 @@ std::string refutation(const AdoptedEffect& adopted, const Observations& observa
     if (bounds.role == ParameterRole::kShape && shape.low <= bounds.lower && shape.high >= bounds.upper)
       return fmt::format("its {} may be anything within its bounds", shape.name);
   }
-  if (adopted.bends_away)
-    return fmt::format("what goes with {} bends away from its formula",
-                       fmt::join(own_conditions(*adopted.term.effect, observations), ", "));
+  if (adopted.bends_away) {
+    std::vector<std::string> by = own_conditions(*adopted.term.effect, observations);
+    if (by.empty()) by = {"the force"};
+    return fmt::format("what goes with {} bends away from its formula", fmt::join(by, ", "));
+  }
   const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
   // Where groups have their own, these may be of either sign, and nothing on the whole.
   const bool nothing =

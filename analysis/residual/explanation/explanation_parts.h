@@ -12,6 +12,9 @@ namespace tunnelrig {
 Explanation explain_once(const Observations& observations, const std::vector<const Effect*>& effects,
                          const SearchSettings& settings);
 
+/// By what is adopted and unknown, where there were blocks enough.
+std::string verdict_of(const Explanation& explanation);
+
 // --- estimate_on_all.cpp
 
 /// A model with the scatter that its fit to the open runs allows for.
@@ -78,9 +81,6 @@ void warn_of_tares(const Observations& observations, const MeanModel& model, Exp
 
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
-
-/// By what is adopted and unknown, where there were blocks enough.
-std::string verdict_of(const Explanation& explanation);
 
 // --- incomplete_conditions.cpp
 

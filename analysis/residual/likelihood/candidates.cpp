@@ -3,48 +3,53 @@
 #include "analysis/residual/observations/condition_values.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <set>
 
 namespace tunnelrig {
 namespace {
 
-/// Of rising numbers of rows, those with a group that has rows before and from there on: a step between
-/// groups is their difference.
-std::vector<double> within_a_group(const Observations& observations, const std::vector<int>& rows,
-                                   const std::vector<double>& points) {
-  const std::map<int, std::vector<int>> of_groups = rows_of_each(observations.group, rows);
-  std::vector<double> result;
-  auto next = rows.begin();
-  int last = -1;  // row of any group that has rows before the point
-  for (const double point : points) {
-    for (; next != rows.end() && *next < point; ++next)
-      last = std::max(last, of_groups.at(observations.group[static_cast<std::size_t>(*next)]).back());
-    if (last >= point) result.push_back(point);
+/// Places in `rows`, counted from its beginning, before which there are enough blocks; as many as rows: none.
+template <class Iterator>
+std::size_t past_enough_blocks(const Observations& observations, Iterator first, Iterator last) {
+  std::set<int> blocks;
+  std::size_t passed = 0;
+  for (auto row = first; row != last; ++row) {
+    blocks.insert(observations.block[static_cast<std::size_t>(*row)]);
+    ++passed;
+    if (blocks.size() == kLeastBlocksBesideAStep) return passed;
+  }
+  return passed + 1;
+}
+
+/// For each place in `rows`, the runs before and from there on of the groups that have some on both sides,
+/// the fewer of the two: a step between groups is their difference, and no group tells it by a run or two.
+std::vector<int> runs_beside(const Observations& observations, const std::vector<int>& rows) {
+  std::map<int, int> of_group, passed;
+  for (const int row : rows) ++of_group[observations.group[static_cast<std::size_t>(row)]];
+  int before = 0, after = 0;
+  std::vector<int> result;
+  for (const int row : rows) {
+    result.push_back(std::min(before, after));
+    const int group = observations.group[static_cast<std::size_t>(row)];
+    const int all = of_group[group], had = passed[group]++;
+    before += had + 1 == all ? -had : 1;
+    after += had == 0 ? all - 1 : -1;
   }
   return result;
 }
 
-/// Run numbers at which a change-point leaves enough blocks of `rows` on both sides: the first run of each
-/// block, where a group goes on. Of a long table some, evenly spread: a step that is found is placed after.
+/// Run numbers at which a step is tried: where a block begins. Of a long table some, evenly spread: a step
+/// that is found is placed after.
 std::vector<double> change_points(const Observations& observations, const std::vector<int>& rows) {
-  std::vector<int> blocks;
-  std::vector<double> first;
-  for (const int row : rows) {
-    const int block = observations.block[static_cast<std::size_t>(row)];
-    if (blocks.empty() || blocks.back() != block) {
-      blocks.push_back(block);
-      first.push_back(row);
-    }
+  std::vector<double> points;
+  for (const int row : rows_where_a_step_may_begin(observations, rows)) {
+    const auto place = std::ranges::lower_bound(rows, row);
+    if (observations.block[static_cast<std::size_t>(row)] !=
+        observations.block[static_cast<std::size_t>(*(place - 1))])
+      points.push_back(row);
   }
-  if (static_cast<int>(blocks.size()) < 2 * kLeastBlocksBesideAStep) return {};
-  std::vector<double> points{first.begin() + kLeastBlocksBesideAStep,
-                             first.end() - kLeastBlocksBesideAStep + 1};
-  const double least = kLeastShareBesideAStep * static_cast<double>(rows.size());
-  std::erase_if(points, [&](double point) {
-    const auto before = static_cast<double>(std::ranges::lower_bound(rows, point) - rows.begin());
-    return before < least || static_cast<double>(rows.size()) - before < least;
-  });
-  points = within_a_group(observations, rows, points);
   constexpr std::size_t kMost = 300;
   const std::size_t every = std::max<std::size_t>(1, (points.size() + kMost - 1) / kMost);
   std::vector<double> some;
@@ -53,6 +58,18 @@ std::vector<double> change_points(const Observations& observations, const std::v
 }
 
 }  // namespace
+
+std::vector<int> rows_where_a_step_may_begin(const Observations& observations, const std::vector<int>& rows) {
+  const auto share =
+      static_cast<std::size_t>(std::ceil(kLeastShareBesideAStep * static_cast<double>(rows.size())));
+  const std::size_t before = std::max(share, past_enough_blocks(observations, rows.begin(), rows.end()));
+  const std::size_t after = std::max(share, past_enough_blocks(observations, rows.rbegin(), rows.rend()));
+  const std::vector<int> beside = runs_beside(observations, rows);
+  std::vector<int> result;
+  for (std::size_t place = before; place + after <= rows.size(); ++place)
+    if (beside[place] >= kLeastRunsBesideAStep) result.push_back(rows[place]);
+  return result;
+}
 
 std::vector<Term> ways_to_try(const Effect& effect, const Observations& observations,
                               const std::vector<int>& rows) {

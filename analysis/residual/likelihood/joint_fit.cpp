@@ -340,8 +340,8 @@ JointFit fit_jointly(const Observations& observations, const MeanModel& start, c
   JointFit fit{.model = start, .linear = {}, .variances = {}, .at_bound = {}};
   const MixedModel mixed(observations, rows);
   const Components y = response_components(observations);
-  // Variances depend on the mean and the mean on the variances: twice round is enough for them, since both
-  // move little. Forces depend on the mean as well, and large effects on the forces.
+  // Variances depend on the mean and the mean on the variances, forces on the mean, and large effects on the
+  // forces.
   for (int round = 0; round < kMostRounds; ++round) {
     const Forces forces = predict_forces(observations, fit.model, rows);
     fit.linear = linearise(observations, fit.model, forces);

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -168,6 +169,16 @@ std::vector<std::string> own_conditions(const Effect& effect, const Observations
   const bool of_rotors = !observations.from_table || observations.of_air;
   if (of_rotors && observations.find("speed_rpm") != nullptr) return {"speed_rpm"};
   return {};
+}
+
+bool goes_by_the_law_alone(const Effect& effect, const Observations& observations) {
+  if (observations.baseline_over.empty() || observations.is_line()) return false;
+  const std::vector<std::string> by = own_conditions(effect, observations);
+  const Covariate* over = observations.find(observations.baseline_over);
+  const Covariate* own = by.size() == 1 ? observations.find(by[0]) : nullptr;
+  if (over == nullptr || own == nullptr || !own->labels.empty()) return false;
+  const Eigen::ArrayXd ratio = own->value.col(0).array() / over->value.col(0).array();
+  return ((ratio - ratio(0)).abs() <= 1e-6 * std::abs(ratio(0))).all();
 }
 
 std::vector<Term> known_terms(const Observations& observations) {

@@ -115,9 +115,10 @@ struct RunScatter {
 
 /// n runs (rows of a table) by c channels (rotors; 1 for a table).
 ///
-/// Where the response has one sign the model is multiplicative: `y` is the logarithm of the response over
-/// what the baseline takes as known (k_i ½ρΩ²R²A), and errors are relative. Otherwise it is additive: `y` is
-/// the response.
+/// Where a campaign's response is positive, and a table's of one sign (unless it scatters alike or the
+/// baseline is `linear:`), the model is multiplicative: `y` is the logarithm of the response over what the
+/// baseline takes as known (k_i ½ρΩ²R²A), and errors are relative. Otherwise it is additive: `y` is the
+/// response.
 struct Observations {
   std::string campaign, response, unit, baseline;
   bool multiplicative = true;
@@ -126,7 +127,7 @@ struct Observations {
   Eigen::MatrixXd y;      // n × c
   std::vector<Eigen::MatrixXd>
       shape;  // J matrices n × c: cosine coefficients of the run's course; empty without raw data
-  Eigen::VectorXd duration_s;  // 0 where there is no raw data
+  Eigen::VectorXd duration_s;  // of the raw data, else the column of this name; 0: neither, or a table
 
   std::vector<std::string> name;  // of each run, or "file:line" of a row
   std::vector<int> group,

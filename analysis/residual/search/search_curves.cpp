@@ -152,7 +152,14 @@ void Search::forget_what_has_a_name() {
       return std::ranges::find_first_of(own, of_term) != own.end();
     });
   };
-  for (FoundCurve& found : result_.curves) std::erase_if(found.could_be, has);
+  const auto is_named = [&](const std::string& name) {
+    return std::ranges::any_of(result_.accepted,
+                               [&](const Accepted& accepted) { return accepted.term.effect->name == name; });
+  };
+  for (FoundCurve& found : result_.curves) {
+    std::erase_if(found.could_be, has);
+    std::erase_if(found.instead_of, is_named);  // taken again after the curve
+  }
 }
 
 void Search::drop(std::size_t t, const JointFit& without) {

@@ -1,4 +1,5 @@
 // An effect whose amplitude is each group's own.
+#include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/search/group_amplitudes.h"
 #include "analysis/residual/search/search.h"
 #include "analysis/residual/search/shape_profile.h"
@@ -37,6 +38,7 @@ void Search::add_group_ways(Scan& scan) const {
   const std::size_t alike = scan.ways.size();
   for (std::size_t i = 0; i < alike; ++i) {
     const auto& parameters = scan.ways[i].effect->parameters;
+    if (goes_by_the_law_alone(*scan.ways[i].effect, observations_)) continue;
     if (parameters.size() > 1 || parameters[0].theory || parameters[0].lower >= 0 || parameters[0].upper <= 0)
       continue;
     Candidate own{.columns = columns_by_group(scan.candidates[i].columns[0], observations_, groups, *mixed_),
@@ -100,7 +102,8 @@ void Search::take(InGroups own) {
 bool Search::let_groups_differ(std::size_t t, bool before_others) {
   if (!observations_.from_table || observations_.groups() < 2) return false;
   const Term term = result_.accepted[t].term;
-  if (term.per_group || term.effect->theory_only) return false;
+  if (term.per_group || term.effect->theory_only || goes_by_the_law_alone(*term.effect, observations_))
+    return false;
   InGroups own = fit_in_groups(term, fit_.model.without_term(t));
   if (p_of_groups(observations_, fit_, own.observations, own.fit) > settings_.alpha ||
       !gain_of(own, before_others))

@@ -32,7 +32,7 @@ double worth(const JointFit& fit) {
 void Search::swap_weaker() {
   for (std::size_t t = 0; t + 1 < result_.accepted.size(); ++t) {
     const Term old = result_.accepted[t].term;
-    if (old.per_group) continue;
+    if (old.per_group || old.effect->theory_only) continue;  // as for a curve (drop_what_a_curve_replaces)
     const JointFit without = fit_without(t);
     const Scan scan = scan_effects(without);
     if (scan.order.empty()) continue;

@@ -1,31 +1,16 @@
 #include "analysis/residual/search/step_profile.h"
 
+#include "analysis/residual/likelihood/candidates.h"
 #include "analysis/residual/search/group_amplitudes.h"
 
 #include <algorithm>
 #include <iterator>
 #include <optional>
-#include <set>
 
 namespace tunnelrig {
 namespace {
 
 using Eigen::Index;
-
-/// Rows that leave enough blocks before them and from them on.
-std::vector<int> possible_rows(const Observations& observations, const std::vector<int>& rows) {
-  const auto blocks_up_to = [&](auto first, auto last) {
-    std::set<int> blocks;
-    auto row = first;
-    while (row != last && blocks.size() < kLeastBlocksBesideAStep)
-      blocks.insert(observations.block[static_cast<std::size_t>(*row++)]);
-    return blocks.size() < kLeastBlocksBesideAStep ? std::ssize(rows) : std::distance(first, row);
-  };
-  const auto before = blocks_up_to(rows.begin(), rows.end());
-  const auto behind = blocks_up_to(rows.rbegin(), rows.rend());
-  if (before + behind > std::ssize(rows)) return {};
-  return {rows.begin() + before, rows.end() - behind + 1};
-}
 
 /// Of a step that begins at these rows, beside the rest of the model.
 class StepLikelihoods {
@@ -116,7 +101,7 @@ StepProfile step_profile(const Observations& given, const MeanModel& model, std:
                          const std::vector<int>& rows) {
   constexpr std::ptrdiff_t kAtOnce = 32;
   constexpr double kClearlyNot = 3 * kStepInterval;  // beyond it a profile hardly comes back
-  const std::vector<int> possible = possible_rows(given, rows);
+  const std::vector<int> possible = rows_where_a_step_may_begin(given, rows);
   StepProfile profile;
   if (possible.empty()) return profile;
   StepLikelihoods evaluate(given, model, t, rows);

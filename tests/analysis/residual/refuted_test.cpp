@@ -218,5 +218,16 @@ TEST_F(Refuted, ANameOfWhichTheTimeConstantIsNotKnownIsNone) {
               HasSubstr("time_constant may be anything"));
 }
 
+TEST_F(Refuted, WhatGoesWithTheForceAloneIsSaidToBendOverIt) {
+  const Observations o = observed("y\n1\n2\n", "[response]\ncolumn = \"y\"\nunit = \"N\"\n");
+  AdoptedEffect offset{.term = {.effect = &test::effect_named("zero_offset"), .parameters = {0.02}},
+                       .parameters = {{.name = "offset", .value = 0.02, .low = 0.01, .high = 0.03}},
+                       .confounded_with = {},
+                       .separating_run = {}};
+  EXPECT_EQ(refutation(offset, o), "");
+  offset.bends_away = true;
+  EXPECT_THAT(refutation(offset, o), HasSubstr("goes with the force bends away"));
+}
+
 }  // namespace
 }  // namespace tunnelrig

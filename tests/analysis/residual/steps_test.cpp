@@ -1,6 +1,7 @@
 // Steps: where they are, and what is none.
 #include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/likelihood/candidates.h"
 #include "analysis/residual/search/step_profile.h"
 #include "analysis/residual/tables.h"
 
@@ -222,6 +223,18 @@ TEST_F(Steps, OfAHundredGroupsAreFound) {
   ASSERT_TRUE(e.adopted[0].term.per_group);
   EXPECT_NEAR(first_row_of(e.adopted[0].term), kFirst, 3);
   EXPECT_NEAR(e.adopted[0].parameters[0].value, 0.03, 0.01);
+}
+
+/// The last row of one group, and all of the next: a step there is that row's.
+TEST_F(Steps, NoGroupTellsAStepByItsLastRow) {
+  constexpr int kRows = 30;
+  Observations o = test::simulate({.runs_of_block = std::vector<int>(2 * kRows, 1), .sigma = 0.01}, random);
+  o.group_name = {"A", "B"};
+  for (std::size_t row = 0; row < o.group.size(); ++row) o.group[row] = row < kRows ? 0 : 1;
+  const auto possible = rows_where_a_step_may_begin(o, o.all_rows());
+  EXPECT_THAT(possible, testing::AllOf(Contains(3), Contains(kRows - 3), Contains(kRows + 3)));
+  for (const int row : {2, kRows - 2, kRows, kRows + 2, 2 * kRows - 2})
+    EXPECT_THAT(possible, testing::Not(Contains(row)));
 }
 
 }  // namespace

@@ -245,5 +245,49 @@ TEST_F(TablesTest, WhatOneForceCannotShowIsNotTriedBesideAnother) {
   EXPECT_THAT(names(e), HasSubstr("creep"));
 }
 
+/// Where groups have Reynolds exponents of their own, these can take the square of the speed into themselves.
+TEST_F(TablesTest, TheSquareOfTheSpeedIsNoGroupsOwn) {
+  constexpr std::array<double, 2> kExponent = {0.1, 0.3};
+  for (int table = 0; table < 6; ++table) {
+    std::string csv = "motor,file,n,y\n";
+    for (std::size_t motor = 0; motor < kExponent.size(); ++motor)
+      for (int r = 0; r < 120; ++r) {
+        const double n = 1500 + 5500 * even(random);
+        csv +=
+            fmt::format("{},{}-{},{},{}\n", motor, motor, r / 12, n,
+                        1.5e-7 * n * n * std::pow(n / 4000, kExponent[motor]) * (1 + 0.02 * scatter(random)));
+      }
+    const Explanation e = explained(
+        observed(csv,
+                 "groups = [\"motor\"]\nblocks = \"file\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+                 "meaning = \"thrust_N\"\n[speed]\ncolumn = \"n\"\nunit = \"rpm\"\n"));
+    ASSERT_EQ(names(e), "rotor_speed reynolds_number ") << "table " << table;
+    const auto& groups = e.adopted[1].parameters[0].groups;
+    ASSERT_EQ(groups.size(), kExponent.size());
+    for (std::size_t motor = 0; motor < kExponent.size(); ++motor)
+      EXPECT_NEAR(groups[motor].value, kExponent[motor], 0.03);
+  }
+}
+
+/// A bend of each group's power law over the speed is as likely the law's as its blades'.
+TEST_F(TablesTest, BendsOfTheGroupsLawsHaveNoName) {
+  std::string csv = "rotor,n,y\n";
+  for (int rotor = 0; rotor < 2; ++rotor)
+    for (int r = 0; r < 60; ++r) {
+      const double n = 2000 + 4000 * even(random), x = std::log(n / 4000), bend = rotor == 0 ? 0.2 : -0.2;
+      csv +=
+          fmt::format("{},{},{}\n", rotor, n, 5 * std::exp(2.1 * x + bend * x * x + 0.003 * scatter(random)));
+    }
+  const std::string schema =
+      "groups = [\"rotor\"]\nblocks = \"rows\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = "
+      "\"thrust_N\"\n"
+      "[speed]\ncolumn = \"n\"\nunit = \"rpm\"\n";
+  const Observations over_speed = observed(csv, schema, "power:n");
+  EXPECT_EQ(names(explained(over_speed)), "");
+  const Effect& flex = test::effect_named("blade_flex");
+  EXPECT_TRUE(goes_by_the_law_alone(flex, over_speed));
+  EXPECT_FALSE(goes_by_the_law_alone(flex, observed(csv, schema)));
+}
+
 }  // namespace
 }  // namespace tunnelrig
