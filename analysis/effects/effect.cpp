@@ -9,7 +9,7 @@ namespace tunnelrig {
 
 bool Effect::within_time() const {
   return std::any_of(covariates.begin(), covariates.end(),
-                     [](const std::string& column) { return column == "time_since_motor_start_s"; });
+                     [](const std::string& column) { return column == kTimeSinceMotorStart; });
 }
 
 std::string Effect::cause() const { return form_is_axis ? name + " (" + form + ")" : name; }

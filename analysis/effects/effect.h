@@ -9,11 +9,15 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <ceres/jet.h>
 
 namespace tunnelrig {
+
+/// The covariate that goes on within a run, where the others stand for the whole of it.
+inline constexpr std::string_view kTimeSinceMotorStart = "time_since_motor_start_s";
 
 inline constexpr int kMaxEffectParameters = 3;
 using EffectJet = ceres::Jet<double, kMaxEffectParameters>;

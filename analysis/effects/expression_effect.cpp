@@ -15,9 +15,6 @@
 namespace tunnelrig {
 namespace {
 
-// Goes on within a run, where the other covariates stand for the whole of it.
-constexpr std::string_view kTime = "time_since_motor_start_s";
-
 int line_of(const toml::node& node) { return static_cast<int>(node.source().begin.line); }
 
 /// Reads keys of one table, with file and line in every message.
@@ -141,7 +138,8 @@ class Formula {
     if (name == "F") return {};
     for (std::size_t k = 0; k < effect.parameters.size(); ++k)
       if (effect.parameters[k].name == name) return {What::kParameter, k};
-    return {name == kTime ? What::kRunningTime : What::kCovariate, index_in(name, effect.covariates)};
+    return {name == kTimeSinceMotorStart ? What::kRunningTime : What::kCovariate,
+            index_in(name, effect.covariates)};
   }
 
   Expression expression_;

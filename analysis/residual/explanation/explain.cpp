@@ -94,12 +94,28 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
   return explanation;
 }
 
+/// A time constant beyond all times that were seen, which may be twice as long as well: a straight line does
+/// what the formula does, and of the state that it would settle in nobody has seen anything.
+std::string no_more_than_a_line(const AdoptedEffect& adopted, const Observations& observations) {
+  const Covariate* time = observations.find(kTimeSinceMotorStart);
+  if (!adopted.term.effect->within_time() || time == nullptr) return "";
+  const double longest_s = (time->value.rowwise().maxCoeff() + observations.duration_s).maxCoeff();
+  for (std::size_t k = 1; k < adopted.parameters.size(); ++k) {
+    const ParameterEstimate& constant = adopted.parameters[k];
+    const double upper = adopted.term.effect->parameters[k].upper;
+    if (constant.value > longest_s && (constant.high > 2 * constant.value || constant.high >= upper))
+      return fmt::format("its {} is {:.3g} s and may be far longer, of which no run shows more than {:.3g} s",
+                         constant.name, constant.value, longest_s);
+  }
+  return "";
+}
+
 /// What the opened seal refutes: single names, or all of them, since which is wrong is not known, and another
 /// for the same would be chosen by the seal.
 struct Refuted {
   std::vector<Term> terms;
   std::vector<std::string> why;  // of each of `terms`
-  bool at_bound = false;         // one of them
+  bool beyond = false;           // of one of them what is physical, or was seen: it never stays
   bool structure = false;        // of one of them the data have, in another shape
   bool all = false;
   bool any() const { return all || !terms.empty(); }
@@ -132,7 +148,7 @@ Refuted refuted(const Explanation& explanation, const Observations& observations
   for (auto& [adopted, why] : against) {
     result.terms.push_back(adopted->term);
     result.why.push_back(std::move(why));
-    result.at_bound |= adopted->at_bound;
+    result.beyond |= adopted->at_bound || !no_more_than_a_line(*adopted, observations).empty();
     result.structure |= adopted->bends_away || adopted->anywhere;
   }
   result.all =
@@ -187,11 +203,11 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
     without.untestable = explanation.untestable;
     // What bends away from a formula, or is no step, is structure, and predicts as such.
     const double without_them = found.structure ? without.sealed.all : without.sealed.names;
-    const bool stay = !found.at_bound && is_worse(explanation.sealed.curves, explanation.sealed.all) &&
+    const bool stay = !found.beyond && is_worse(explanation.sealed.curves, explanation.sealed.all) &&
                       is_worse(without_them, explanation.sealed.all);
     if (stay) {
       const auto as_well = std::ranges::find_if(before, [&](const Found& earlier) {
-        return !earlier.refuted.all && !earlier.refuted.at_bound &&
+        return !earlier.refuted.all && !earlier.refuted.beyond &&
                !is_worse(earlier.explanation.sealed.all, explanation.sealed.all);
       });
       if (as_well == before.end()) {
@@ -227,6 +243,7 @@ std::string refutation(const AdoptedEffect& adopted, const Observations& observa
     if (bounds.role == ParameterRole::kShape && shape.low <= bounds.lower && shape.high >= bounds.upper)
       return fmt::format("its {} may be anything within its bounds", shape.name);
   }
+  if (const std::string line = no_more_than_a_line(adopted, observations); !line.empty()) return line;
   if (adopted.bends_away) {
     std::vector<std::string> by = own_conditions(*adopted.term.effect, observations);
     if (by.empty()) by = {"the force"};
@@ -264,7 +281,14 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
   Explanation explanation = explain_once(aside.kept, effects, settings);
   for (int again = 0; again < kMostSearches; ++again) {
     const std::vector<SuspectRow> gross = gross_rows(aside.kept, explanation.suspect_rows);
-    if (gross.empty() || gross.size() > aside.room()) break;  // many are no typing errors: the model is wrong
+    if (gross.empty()) break;
+    if (gross.size() > aside.room()) {  // many are no typing errors: the model is wrong
+      said.push_back(fmt::format(
+          "{} {} are far off, more than are set aside ({} at most): what scatters like them hides the rest; "
+          "look at suspect_rows, and leave out what is wrong",
+          gross.size(), observations.from_table ? "rows" : "runs", aside.most));
+      break;
+    }
     aside.take(gross);
     explanation = explain_once(aside.kept, effects, settings);
   }

@@ -54,8 +54,12 @@ double sigma_by_median(const VectorXd& sizes) {
 }
 
 /// σ. A campaign has some 1,700 values that are not typed by hand. Of Student's t with three degrees of
-/// freedom one of 2,300 lies beyond 10 of its standard deviations, one of 19,000 beyond 20.
-double gross_beyond(const Observations& observations) { return observations.from_table ? 10 : 20; }
+/// freedom one of 2,300 lies beyond 10 of its standard deviations, one of 19,000 beyond 20. That the k
+/// farthest are all twice as far as the next has the chance 2^(−3k) in such tails: of several that are apart
+/// it says enough.
+double gross_beyond(const Observations& observations, std::size_t together = 1) {
+  return observations.from_table || together > 1 ? 10 : 20;
+}
 
 /// Several gross rows hide each other in the variance: of n rows, k alike are hardly beyond √(n/k) of it. But
 /// they lie apart. Residuals of rows (of a campaign's runs, what is common to the rotors), each from its
@@ -79,7 +83,7 @@ VectorXd distance_of_those_apart(const Observations& observations, const std::ve
   std::vector<double> sorted(size.begin(), size.end());
   std::sort(sorted.begin(), sorted.end(), std::greater<>());
   for (std::size_t k = sorted.size() / kRowsPerGross; sigma > 0 && k > 0; --k)
-    if (sorted[k - 1] > gross_beyond(observations) * sigma && sorted[k - 1] >= kGap * sorted[k])
+    if (sorted[k - 1] > gross_beyond(observations, k) * sigma && sorted[k - 1] >= kGap * sorted[k])
       return (size.array() >= sorted[k - 1]).select(away / sigma, 0);
   return VectorXd::Zero(residual.size());
 }

@@ -34,6 +34,15 @@ double prior_weight(const Term& term, const Observations& observations, std::siz
   return weight;
 }
 
+/// What has another coefficient than theory's has no theory for it.
+bool refuses_theory(const Term& way, const CandidateFit& fit) {
+  constexpr double kAtOdds = 1.92;  // a likelihood ratio that one parameter has once in twenty
+  const Effect& effect = *way.effect;
+  if (!effect.theory() || effect.theory_only || !(fit.likelihood_ratio > 0)) return false;
+  const double off = fit.amplitude(0) / *effect.theory() - 1, own = fit.amplitude(0) / *effect.theory();
+  return fit.likelihood_ratio * off * off > kAtOdds * own * own;
+}
+
 }  // namespace
 
 void Search::add_effects() {
@@ -115,6 +124,8 @@ Candidate Search::candidate_of(const Term& way, const Eigen::MatrixXd& predicted
 void Search::rank(const JointFit& base, Scan& scan) const {
   scan.scan = std::make_unique<CandidateScan>(*mixed_, base.linear.columns, scan.candidates);
   scan.fits = scan.scan->fit(difference(y_, base.linear.offset));
+  for (std::size_t i = 0; i < scan.ways.size(); ++i)
+    if (refuses_theory(scan.ways[i], scan.fits[i])) scan.fits[i].evidence -= std::log10(kKnownPhysicsWeight);
   scan.order.resize(scan.fits.size());
   std::iota(scan.order.begin(), scan.order.end(), 0U);
   std::sort(scan.order.begin(), scan.order.end(),
@@ -199,7 +210,8 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
     const LossDifference gain = compare(unseen(fit_, fit.variances), after);
     if (const auto reason = why_not(fit, after, gain)) {
       round.outcome += *reason + "; ";
-      if (best == scan.order[0] && at_bound(fit, fit.model.terms.back()))
+      const Term& bounded = fit.model.terms.back();
+      if (best == scan.order[0] && at_bound(fit, bounded) && !lacks_speed_squared(bounded))
         beyond = beyond_bounds(scan.ways[i], scan.fits[i].amplitude(0));
       continue;
     }

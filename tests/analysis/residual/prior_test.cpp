@@ -29,6 +29,17 @@ struct Prior : testing::Test {
     test::add_covariate(o, "air_pressure_Pa", 99300, 103300, random);
     return o;
   }
+  /// A share of clipped samples that goes with the pressure, and with the thrust a little better.
+  Observations with_clipping(double exponent, double noise_Pa) {
+    Observations o = observations();
+    MatrixXd& pressure_Pa = o.covariates.back().value;
+    const MatrixXd clipped = 0.2 - 0.1 * (pressure_Pa.array() / 101325).log();
+    test::add_effect(o, "air_pressure", {exponent});
+    std::normal_distribution<double> reading(0, noise_Pa);
+    for (Index row = 0; row < o.rows(); ++row) pressure_Pa(row, 0) += reading(random);
+    o.covariates.push_back({"clip_fraction", clipped});
+    return o;
+  }
   /// C_T of one propeller at speeds that are drawn.
   Observations coefficients(const std::function<double()>& draw_rpm) {
     Observations o = test::simulate({.runs_of_block = std::vector<int>(16, 8), .groups = 1}, random);
@@ -46,16 +57,8 @@ struct Prior : testing::Test {
   }
 };
 
-/// A share of clipped samples that goes with the pressure, and with the thrust a little better.
 TEST_F(Prior, WhereTheoryGivesTheCoefficientANameIsLikelier) {
-  Observations o = observations();
-  MatrixXd& pressure_Pa = o.covariates.back().value;
-  const MatrixXd clipped = 0.2 - 0.1 * (pressure_Pa.array() / 101325).log();
-  test::add_effect(o, "air_pressure", {1});
-  std::normal_distribution<double> reading(0, 8);
-  for (Index row = 0; row < o.rows(); ++row) pressure_Pa(row, 0) += reading(random);
-  o.covariates.push_back({"clip_fraction", clipped});
-  const Explanation e = explained(o);
+  const Explanation e = explained(with_clipping(1, 8));
   ASSERT_EQ(names(e), std::vector<std::string>{"air_pressure"});
   EXPECT_THAT(e.adopted[0].confounded_with, Contains("adc_clipping"));
 }
@@ -137,6 +140,17 @@ TEST_F(Prior, ACurveHasAsManyColumnsAsItNeeds) {
   const Explanation e = explained(o);
   ASSERT_EQ(e.model.curves.size(), 1u);
   EXPECT_EQ(e.model.curves[0].columns.size(), 1u) << "a straight line";
+}
+
+/// The same with twice theory's exponent, for which there is no theory.
+TEST_F(Prior, ACoefficientThatTheoryRefusesIsNoLikelier) {
+  constexpr int kCampaigns = 12;
+  int clipped = 0;
+  for (int campaign = 0; campaign < kCampaigns; ++campaign) {
+    const auto found = names(explained(with_clipping(2, 8)));
+    clipped += !found.empty() && found[0] == "adc_clipping" ? 1 : 0;
+  }
+  EXPECT_GE(clipped, kCampaigns * 2 / 3);
 }
 
 }  // namespace

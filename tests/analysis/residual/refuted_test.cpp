@@ -229,5 +229,42 @@ TEST_F(Refuted, WhatGoesWithTheForceAloneIsSaidToBendOverIt) {
   EXPECT_THAT(refutation(offset, o), HasSubstr("goes with the force bends away"));
 }
 
+/// Of a state that nobody has seen a formula says nothing, where a straight line fits as well.
+TEST_F(Refuted, ATimeConstantBeyondTheTimesThatWereSeenIsNone) {
+  Observations o = test::four_rotors(3, 0.002, random);
+  test::add_covariate(o, std::string(kTimeSinceMotorStart), 5, 290, random);
+  o.duration_s.setConstant(10);
+  const Effect& warm_up = test::effect_named("motor_warm_up");
+  const auto with_constant = [&](double low, double value, double high) {
+    return AdoptedEffect{.term = {.effect = &warm_up, .parameters = {0.02, value}},
+                         .parameters = {{.name = "amplitude", .value = 0.02, .low = 0.01, .high = 0.03},
+                                        {.name = "time_constant", .value = value, .low = low, .high = high}},
+                         .confounded_with = {},
+                         .separating_run = {}};
+  };
+  EXPECT_EQ(refutation(with_constant(50, 280, 900), o), "");
+  EXPECT_EQ(refutation(with_constant(200, 400, 600), o), "");
+  for (const AdoptedEffect& line : {with_constant(20, 400, 1300), with_constant(7200, 7200, 7200)})
+    EXPECT_THAT(refutation(line, o), HasSubstr("of which no run shows more than"))
+        << line.parameters[1].value;
+}
+
+/// A thrust that goes on falling for as long as the motors turn: whatever its time constant, it is beyond.
+TEST_F(Refuted, AStraightLineInTimeIsNoExponential) {
+  int line = 0;
+  for (int campaign = 0; campaign < 6; ++campaign) {
+    Observations o = test::four_rotors(3, 0.002, random);
+    test::add_covariate(o, std::string(kTimeSinceMotorStart), 5, 300, random);
+    const Eigen::VectorXd since_s = o.covariates.back().value.col(0);
+    test::set_y(o, o.y.colwise() - 4e-5 * since_s);
+    const Explanation e = explained(o);
+    if (!e.adopted.empty()) continue;  // noise may bend a line
+    ASSERT_EQ(e.unknown.size(), 1u) << explanation_text(e);
+    EXPECT_EQ(e.unknown[0].covariate, kTimeSinceMotorStart);
+    ++line;
+  }
+  EXPECT_GE(line, 5);
+}
+
 }  // namespace
 }  // namespace tunnelrig

@@ -6,11 +6,13 @@
 #include "support/seeds.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -191,6 +193,30 @@ TEST_F(HeldOutRows, AreNotWrongWhereTheirBlockIsElsewhere) {
   EXPECT_THAT(apart(), testing::IsEmpty());
   sealed.error.middleRows(18, 6).setConstant(0.01);
   EXPECT_THAT(apart(), testing::IsEmpty()) << "two of eight";
+}
+
+/// None is as far off as a single one must be, but both are apart.
+TEST_F(Mistyped, SeveralRunsThatAreApartAreSetAsideTogether) {
+  Observations o = test::four_rotors(4, 0.002, random);
+  constexpr std::array<std::pair<int, double>, 2> kOff = {{{9, 0.022}, {70, -0.018}}};
+  Eigen::MatrixXd y = o.y;
+  for (const auto& [run, off] : kOff) y.row(run).array() += off;
+  test::set_y(o, y);
+  std::vector<std::string> aside, off;
+  for (const SuspectRow& row : test::explained(o).suspect_rows)
+    if (row.set_aside) aside.push_back(row.row);
+  for (const auto& [run, size] : kOff) off.push_back(o.name[static_cast<std::size_t>(run)]);
+  EXPECT_THAT(aside, UnorderedElementsAreArray(off));
+}
+
+TEST_F(Mistyped, ManyRunsThatAreFarOffStayAndAreSaid) {
+  Observations o = test::four_rotors(4, 0.002, random);
+  Eigen::MatrixXd y = o.y;
+  for (const int run : {9, 31, 52, 70, 88, 110}) y.row(run).array() += run % 2 == 0 ? 0.05 : -0.04;
+  test::set_y(o, y);
+  const Explanation e = test::explained(o);
+  EXPECT_FALSE(std::ranges::any_of(e.suspect_rows, &SuspectRow::set_aside));
+  EXPECT_THAT(e.warnings, Contains(HasSubstr("6 runs are far off, more than are set aside (5 at most)")));
 }
 
 }  // namespace
