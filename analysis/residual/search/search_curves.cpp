@@ -22,6 +22,9 @@ constexpr double kMostLeft = 0.3, kMostLeft_bending = 1;
 /// effect does.
 constexpr double kLittle_other = 0.02;
 
+/// Of the range of speeds, without a run in it.
+constexpr double kSpeedsApart = 0.5;
+
 }  // namespace
 
 void Search::add_curves(const CurveScan& first) {
@@ -39,9 +42,12 @@ Search::CurveScan Search::scan_curves() const {
   for (const Curve& each : curves_) {
     if (is_described(each)) continue;
     const bool named = std::any_of(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& a) {
-      // What goes with the square of the speed leaves the straight part of a curve over it to be found.
-      return !a.term.effect->theory_only && each.everywhere() && a.term.rotor == each.rotor &&
-             is_over(each, a.term.effect->covariates);
+      if (!each.everywhere() || a.term.rotor != each.rotor || !is_over(each, a.term.effect->covariates))
+        return false;
+      // What goes with the square of the speed leaves the straight part of a curve over it to be found, but
+      // for the difference of a few other speeds from the usual one.
+      return !a.term.effect->theory_only ||
+             widest_gap(*observations_.find(each.covariate), rows_, each.rotor) > kSpeedsApart;
     });
     // What is straight over few values has a name then, and the bends ask for the rest.
     if (named && each.shape == CurveShape::kLevels) continue;
