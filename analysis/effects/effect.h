@@ -70,10 +70,10 @@ enum class EffectScope {
 
 /// What makes it, where that says of which responses an effect can be tried.
 enum class EffectOrigin {
-  kAny,             // no rule but its conditions
-  kAirPressure,     // the density of the air
-  kAirTemperature,  // the same
-  kAirHumidity,     // the same
+  kAny,          // no rule but its conditions
+  kAirPressure,  // this and the next two: the density of the air
+  kAirTemperature,
+  kAirHumidity,
   kCellInAir,       // the temperature of a cell, for which the air's stands
   kWind,            // air that passes through a rotor
   kSpeedSquared,    // the law by which forces go with the rotor's speed

@@ -10,9 +10,9 @@
 namespace tunnelrig {
 namespace {
 
-/// Places in `rows`, counted from its beginning, before which there are enough blocks; as many as rows: none.
+/// How many rows from `first` on have enough blocks among them; one more than there are: too few.
 template <class Iterator>
-std::size_t past_enough_blocks(const Observations& observations, Iterator first, Iterator last) {
+std::size_t rows_of_enough_blocks(const Observations& observations, Iterator first, Iterator last) {
   std::set<int> blocks;
   std::size_t passed = 0;
   for (auto row = first; row != last; ++row) {
@@ -62,8 +62,8 @@ std::vector<double> change_points(const Observations& observations, const std::v
 std::vector<int> rows_where_a_step_may_begin(const Observations& observations, const std::vector<int>& rows) {
   const auto share =
       static_cast<std::size_t>(std::ceil(kLeastShareBesideAStep * static_cast<double>(rows.size())));
-  const std::size_t before = std::max(share, past_enough_blocks(observations, rows.begin(), rows.end()));
-  const std::size_t after = std::max(share, past_enough_blocks(observations, rows.rbegin(), rows.rend()));
+  const std::size_t before = std::max(share, rows_of_enough_blocks(observations, rows.begin(), rows.end()));
+  const std::size_t after = std::max(share, rows_of_enough_blocks(observations, rows.rbegin(), rows.rend()));
   const std::vector<int> beside = runs_beside(observations, rows);
   std::vector<int> result;
   for (std::size_t place = before; place + after <= rows.size(); ++place)

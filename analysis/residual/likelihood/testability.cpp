@@ -90,14 +90,13 @@ Testability by_conditions(const Effect& effect, const Observations& observations
   return result;
 }
 
-/// Why the response is none that what makes an effect would change, or shows it.
+/// Why the response is none that the origin of the effect would change, or none that would show it.
 std::string against_origin(const Effect& effect, const Observations& observations) {
   const bool number = observations.of_no_cell && !observations.is_line();
   const bool power = is_of("power", observations);
   constexpr auto kNumber =
-      "nothing says that a cell read the response, or that the air is in it: it is a number without a unit, "
-      "a "
-      "time, a length or the like";
+      "nothing says that a cell read the response, or that the air is in it: it is a number without a "
+      "unit, a time, a length or the like";
   constexpr auto kPower = "a power is no force that a cell has read";
   switch (effect.origin) {
     case EffectOrigin::kAny:
@@ -108,9 +107,8 @@ std::string against_origin(const Effect& effect, const Observations& observation
     case EffectOrigin::kAirTemperature:
       if (number) return kNumber;
       if (observations.of_air && !observations.is_line()) return "";
-      return "only a table's thrust, coefficient, power or torque is held against a baseline without the "
-             "density "
-             "of its air";
+      return "only a table's thrust, coefficient, power or torque is held against a baseline without "
+             "the density of its air";
     case EffectOrigin::kAirHumidity:
       return number ? kNumber : "";
     case EffectOrigin::kCellInAir:
@@ -132,8 +130,8 @@ std::string against_origin(const Effect& effect, const Observations& observation
       if (shows_zero_offset(observations)) return "";
       return is_made_c_t(observations) && !observations.multiplicative
                  ? "the baseline has a constant beside C_T"
-                 : "only a table's thrust whose speed was measured shows it, by how large it is beside small "
-                   "ones";
+                 : "only a table's thrust whose speed was measured shows it, by how large it is beside "
+                   "small ones";
   }
   return "";
 }
