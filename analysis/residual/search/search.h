@@ -14,6 +14,9 @@
 
 namespace tunnelrig {
 
+/// Of log likelihood, what one parameter brings by chance once in twenty: a ratio test at 5 %.
+inline constexpr double kRatioOfOneParameter = 1.92;
+
 class NullMaxima;
 
 class Search {

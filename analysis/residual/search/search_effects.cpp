@@ -36,11 +36,10 @@ double prior_weight(const Term& term, const Observations& observations, std::siz
 
 /// What has another coefficient than theory's has no theory for it.
 bool refuses_theory(const Term& way, const CandidateFit& fit) {
-  constexpr double kAtOdds = 1.92;  // a likelihood ratio that one parameter has once in twenty
   const Effect& effect = *way.effect;
   if (!effect.theory() || effect.theory_only || !(fit.likelihood_ratio > 0)) return false;
-  const double off = fit.amplitude(0) / *effect.theory() - 1, own = fit.amplitude(0) / *effect.theory();
-  return fit.likelihood_ratio * off * off > kAtOdds * own * own;
+  const double off = 1 - *effect.theory() / fit.amplitude(0);
+  return fit.likelihood_ratio * off * off > kRatioOfOneParameter;
 }
 
 }  // namespace

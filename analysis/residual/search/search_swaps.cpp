@@ -11,8 +11,6 @@ namespace tunnelrig {
 namespace {
 
 constexpr double kSwapDecades = 0.7;  // another explains that much better: it takes the place
-/// Of log likelihood, what a parameter must bring: a ratio test of one at 5 %.
-constexpr double kPerParameter = 1.92;
 
 bool is_other_form(const Term& way, const Term& of) {
   return way.effect != of.effect && way.effect->cause() == of.effect->cause() &&
@@ -24,7 +22,7 @@ double worth(const JointFit& fit) {
   std::size_t free = 0;
   for (const Term& term : fit.model.terms)
     if (!term.effect->has_change_point()) free += term.parameters.size() - (term.at_theory ? 1 : 0);
-  return fit.variances.log_likelihood - kPerParameter * static_cast<double>(free);
+  return fit.variances.log_likelihood - kRatioOfOneParameter * static_cast<double>(free);
 }
 
 }  // namespace

@@ -279,9 +279,8 @@ TEST_F(TablesTest, BendsOfTheGroupsLawsHaveNoName) {
           fmt::format("{},{},{}\n", rotor, n, 5 * std::exp(2.1 * x + bend * x * x + 0.003 * scatter(random)));
     }
   const std::string schema =
-      "groups = [\"rotor\"]\nblocks = \"rows\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = "
-      "\"thrust_N\"\n"
-      "[speed]\ncolumn = \"n\"\nunit = \"rpm\"\n";
+      "groups = [\"rotor\"]\nblocks = \"rows\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+      "meaning = \"thrust_N\"\n[speed]\ncolumn = \"n\"\nunit = \"rpm\"\n";
   const Observations over_speed = observed(csv, schema, "power:n");
   EXPECT_EQ(names(explained(over_speed)), "");
   const Effect& flex = test::effect_named("blade_flex");
