@@ -21,7 +21,7 @@ constexpr std::size_t kWindow = 4096;
 constexpr std::size_t kShortestWindow = 128;
 constexpr std::size_t kMostLines = 12;
 constexpr std::size_t kNoiseStep = 24;  // bins
-constexpr double kShaftBand = 0.04;
+constexpr double kShaftBand = 0.04, kBesideHum = 0.05;
 
 /// FFTW's planner, which also destroys, is the one part of it that threads must not share.
 std::mutex& planner() {
@@ -201,6 +201,10 @@ struct Origin {
   bool of_shaft = true;  // a low multiple, which vibration is sure to have
 };
 
+std::vector<double> grids_hz(const std::optional<double>& mains_hz) {
+  return mains_hz ? std::vector{*mains_hz} : std::vector<double>{50, 60};
+}
+
 std::vector<Origin> origins(double shaft_hz, double rate_hz, double bin_hz, const LineSources& sources) {
   constexpr int kLow = 8;
   constexpr double kError_bins = 0.3, kGrid_Hz = 0.05;
@@ -219,9 +223,7 @@ std::vector<Origin> origins(double shaft_hz, double rate_hz, double bin_hz, cons
                                                       : kOvertone,
                       !alias && k <= kLow});
   }
-  const std::vector<double> grids =
-      sources.mains_hz ? std::vector{*sources.mains_hz} : std::vector<double>{50, 60};
-  for (const double mains_hz : grids)
+  for (const double mains_hz : grids_hz(sources.mains_hz))
     for (int k = 1; k <= 5; ++k)
       result.push_back({fmt::format("mains_{:g}", k * mains_hz), folded(k * mains_hz, rate_hz),
                         std::hypot(error_hz, k * kGrid_Hz), k > 1 ? kHarmonic : 0, false});
@@ -251,6 +253,12 @@ std::string name_of_line(double frequency_hz, const std::vector<Origin>& known, 
 
 }  // namespace
 
+bool may_be_hum(double frequency_hz, double rate_hz, const std::optional<double>& mains_hz) {
+  const double tolerance_hz = 1.5 * rate_hz / static_cast<double>(kWindow);
+  return std::ranges::any_of(
+      grids_hz(mains_hz), [&](double grid_hz) { return std::abs(frequency_hz - grid_hz) <= tolerance_hz; });
+}
+
 LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double rate_hz,
                     const LineSources& sources) {
   LineList list;
@@ -258,10 +266,15 @@ LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double r
   const double bin_hz = rate_hz / static_cast<double>(spectrum.window());
   list.lines = peaks(spectrum, channel, bin_hz);
   const auto strongest_about = [&](double hz) {  // 0: none
-    const auto found = std::ranges::find_if(list.lines, [&](const SpectralLine& line) {
-      return std::abs(line.frequency_hz / hz - 1) <= kShaftBand;
-    });
-    return found == list.lines.end() ? 0 : found->frequency_hz;
+    const SpectralLine* strongest = nullptr;
+    for (const SpectralLine& line : list.lines) {
+      if (std::abs(line.frequency_hz / hz - 1) > kShaftBand) continue;
+      if (strongest == nullptr) strongest = &line;
+      if (!may_be_hum(line.frequency_hz, rate_hz, sources.mains_hz) &&
+          line.amplitude_V > kBesideHum * strongest->amplitude_V)
+        return line.frequency_hz;
+    }
+    return strongest == nullptr ? 0 : strongest->frequency_hz;
   };
   list.shaft_hz = strongest_about(sources.shaft_hz);
   // A propeller that is balanced well has the line of its blades alone.

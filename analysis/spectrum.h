@@ -49,6 +49,10 @@ class WelchSpectrum {
 /// A line at the mains' frequency or one of its harmonics, by its name.
 inline bool is_mains(std::string_view name) { return name.starts_with("mains"); }
 
+/// Whether a line may be the mains' own: within a bin and a half of 4096 frames of 50 or 60 Hz, whichever the
+/// grid has.
+bool may_be_hum(double frequency_hz, double rate_hz, const std::optional<double>& mains_hz);
+
 /// What the lines of a run may be of.
 struct LineSources {
   double shaft_hz = 0;  // about where its line is expected
@@ -59,7 +63,8 @@ struct LineSources {
 /// The lines of a spectrum, strongest first, at most twelve; named after the shaft (shaft, blade_pass =
 /// as many times the shaft as a propeller has blades, shaft_x3 …, with _alias beyond the Nyquist frequency)
 /// or the mains (mains_50 …). The shaft's is the strongest within 4 % of where it is expected, if it stands
-/// out. A line of the mains is none that a multiple of the shaft may be.
+/// out; what may be hum is not, beside another there of a twentieth of it. A line of the mains is none that a
+/// multiple of the shaft may be.
 struct LineList {
   std::vector<SpectralLine> lines;
   double shaft_hz = 0;  // 0: none found

@@ -107,22 +107,27 @@ void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd
 
 namespace {
 
-/// The constant of thrusts beside their C_T, by rows that scatter as they were found to, and its standard
-/// error.
+/// The constant of thrusts beside their C_T, of each direction its own, by rows that scatter as they were
+/// found to, and its standard error.
 struct Tare {
   double value_N = 0, standard_error_N = 0;
 };
 Tare tare_of(const Observations& observations, const VectorXd& thrust_N, const std::vector<int>& rows) {
-  const VectorXd weight = observations.scatter.of_runs(rows).cwiseInverse();
-  Eigen::MatrixXd columns(thrust_N(rows).size(), 2);
-  columns << Eigen::MatrixXd::Ones(columns.rows(), 1), observations.slopes(rows, 0);
+  const VectorXd weight = observations.scatter.of_runs(rows).cwiseInverse(),
+                 slope = observations.slopes(rows, 0);
+  const bool both = slope.minCoeff() < 0 && slope.maxCoeff() > 0;
+  Eigen::MatrixXd columns(slope.size(), both ? 3 : 2);
+  columns.col(0).setOnes();
+  columns.col(1) = both ? VectorXd(slope.cwiseMax(0)) : slope;
+  if (both) columns.col(2) = slope.cwiseMin(0);
   columns = weight.asDiagonal() * columns;
   const VectorXd y = weight.asDiagonal() * VectorXd(thrust_N(rows));
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
-  if (qr.rank() < 2) return {};
-  const Eigen::Vector2d fitted = qr.solve(y);
-  const double variance = (y - columns * fitted).squaredNorm() / static_cast<double>(y.size() - 2);
-  const Eigen::Matrix2d inverse = (columns.transpose() * columns).inverse();
+  if (qr.rank() < columns.cols()) return {};
+  const VectorXd fitted = qr.solve(y);
+  const double variance =
+      (y - columns * fitted).squaredNorm() / static_cast<double>(y.size() - columns.cols());
+  const Eigen::MatrixXd inverse = (columns.transpose() * columns).inverse();
   return {fitted(0), std::sqrt(variance * inverse(0, 0))};
 }
 
@@ -211,7 +216,7 @@ void warn_of_tares(const Observations& observations, const MeanModel& model, Exp
   constexpr double kClear = 4;
   constexpr std::size_t kFewest = 5, kNamed = 4;
   const bool constant_beside_c_t =
-      observations.coefficient && !observations.multiplicative && observations.slopes.cols() == 1;
+      observations.coefficient && !observations.multiplicative && observations.first_own_slope() == 1;
   if (!constant_beside_c_t || observations.baseline != "constant") return;
   const std::vector<int> all = observations.all_rows();
   const Forces forces = predict_forces(observations, model, all);

@@ -42,6 +42,23 @@ struct SetAside {
   }
 };
 
+/// A block of which most rows are set aside has more that is wrong than these.
+void warn_of_half_blocks(const Observations& observations, const SetAside& aside,
+                         std::vector<std::string>& said) {
+  constexpr std::size_t kFewest = 3;
+  for (const auto& [block, places] : places_of_each(observations.block)) {
+    const auto gone = static_cast<std::size_t>(std::ranges::count_if(places, [&](Eigen::Index r) {
+      return std::ranges::any_of(aside.rows, [&](const SuspectRow& row) {
+        return row.row == observations.name[static_cast<std::size_t>(r)];
+      });
+    }));
+    if (gone >= kFewest && 2 * gone > places.size() && gone < places.size())
+      said.push_back(fmt::format(
+          "{} of the {} rows of block {} are set aside, and the rest is likely as wrong: leave the block out",
+          gone, places.size(), observations.block_name[static_cast<std::size_t>(block)]));
+  }
+}
+
 std::string in_words(const IsolatedValue& value, const char* what) {
   return fmt::format("{} of {} is {:.6g}, far from all others ({:.6g} to {:.6g}): {}", value.covariate,
                      value.row, value.value, value.low, value.high, what);
@@ -269,7 +286,8 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
                     const SearchSettings& settings) {
   // A gross error hides what else is there: it is set aside, and said.
   SetAside aside(observations);
-  std::vector<std::string> said;
+  std::vector<std::string> said = blocks_apart(observations);
+  if (const auto row = lone_row(aside.kept); row && aside.room() > 0) aside.take({*row});
   while (const auto row = gross_row(aside.kept)) {
     if (aside.room() == 0) break;
     aside.take({*row});
@@ -283,15 +301,18 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
     const std::vector<SuspectRow> gross = gross_rows(aside.kept, explanation.suspect_rows);
     if (gross.empty()) break;
     if (gross.size() > aside.room()) {  // many are no typing errors: the model is wrong
-      said.push_back(fmt::format(
-          "{} {} are far off, more than are set aside ({} at most): what scatters like them hides the rest; "
-          "look at suspect_rows, and leave out what is wrong",
-          gross.size(), observations.from_table ? "rows" : "runs", aside.most));
+      said.push_back(
+          fmt::format("{} {} are far off, more than are set aside ({} at most{}): what scatters like them "
+                      "hides the rest; "
+                      "look at suspect_rows, and leave out what is wrong",
+                      gross.size(), observations.from_table ? "rows" : "runs", aside.most,
+                      aside.rows.empty() ? "" : fmt::format(", and {} are", aside.rows.size())));
       break;
     }
     aside.take(gross);
     explanation = explain_once(aside.kept, effects, settings);
   }
+  warn_of_half_blocks(observations, aside, said);
   if (observations.from_table)
     explanation = without_isolated(std::move(explanation), aside, effects, settings, said);
   std::vector<const Effect*> left = effects;

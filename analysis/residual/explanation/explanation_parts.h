@@ -157,6 +157,13 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
 /// name, or of blocks of one row, nothing says that it is the row that is wrong.
 std::vector<SuspectRow> apart_from_their_block(const Observations& observations, const HeldOutErrors& sealed);
 
+/// Blocks of a table that the baseline leaves far from all others, in words: their unit may be another.
+std::vector<std::string> blocks_apart(const Observations& observations);
+
+/// The one row of a table that the baseline alone leaves far from all others (apart as above). At the end of
+/// a condition a curve would pass through it, and nothing be far from that.
+std::optional<SuspectRow> lone_row(const Observations& observations);
+
 /// The worst row of a table whose rows stand for themselves, if it is beyond doubt with all that the other
 /// axes can explain in the model.
 std::optional<SuspectRow> gross_row(const Observations& observations);

@@ -38,16 +38,26 @@ bool speak_against(const HeldOutErrors& with, const HeldOutErrors& without) {
 }
 
 /// Whether errors are far larger than runs of that scatter make them, by their blocks: each counts as one.
+/// The floor is known no better than `dof` residuals tell.
 bool is_beyond_floor(const Observations& observations, const ErrorEstimate& estimate, double noise_floor,
-                     const std::vector<int>& scored) {
-  constexpr double kFarAboveFloor = 1.25, kCertain = 0.99;
+                     double dof, const std::vector<int>& scored) {
+  constexpr double kFarAboveFloor = 1.25, kCertain = 0.99, kLikely = 0.9;
   if (!(noise_floor > 0)) return false;
   std::set<int> ids;
   for (const int row : scored) ids.insert(observations.block[static_cast<std::size_t>(row)]);
   const double blocks = static_cast<double>(ids.size());
   const double ratio = estimate.held_out_rmse / noise_floor;
-  return estimate.held_out_low > kFarAboveFloor * noise_floor ||
-         (ratio > kFarAboveFloor && ratio * ratio > chi2_quantile(kCertain, blocks) / blocks);
+  const double highest_floor = noise_floor * std::sqrt(dof / chi2_quantile(1 - kLikely, dof));
+  return estimate.held_out_low > kFarAboveFloor * highest_floor ||
+         (ratio > kFarAboveFloor && f_upper_p(ratio * ratio, blocks, dof) < 1 - kCertain);
+}
+
+/// Residuals that the noise floor is of; of sessions that differ, the sessions.
+double residuals_of_floor(const Observations& observations, const JointFit& fit,
+                          const std::vector<int>& open) {
+  const double rows = degrees_of_freedom(observations, fit, open);
+  const auto blocks = static_cast<double>(places_of_each(observations.block, open).size());
+  return kRatios[fit.variances.ratio[0]] > 0 ? std::min(rows, blocks - 1) : rows;
 }
 
 /// The named terms as they were found beside the curves: fitted without them, they would take up what the
@@ -239,7 +249,8 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
   explanation.noise_floor = rms(whole.expected_std);
   ErrorEstimate all = explanation.after;
   if (!all_shown) with_interval(whole, all_found, all);  // with the curves, whose structure is said
-  explanation.sealed.beyond_floor = is_beyond_floor(alone, all, explanation.noise_floor, scored);
+  explanation.sealed.beyond_floor = is_beyond_floor(alone, all, explanation.noise_floor,
+                                                    residuals_of_floor(wide, found.final, seal.open), scored);
   explanation.before.rmse = rms(residuals(baseline.data, baseline.fit, seal.open));
   explanation.after.rmse = rms(residuals(shown.data, shown.fit, seal.open));
 }

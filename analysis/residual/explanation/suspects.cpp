@@ -9,6 +9,8 @@
 #include <limits>
 #include <numeric>
 
+#include <fmt/format.h>
+
 namespace tunnelrig {
 
 using Eigen::Index;
@@ -102,6 +104,14 @@ MatrixXd residuals_of(const Observations& observations, const HeldOutErrors& err
       .log();
 }
 
+/// 1 − h: of each row's own error, what the fit to all has left.
+MatrixXd share_left(const Observations& observations, const HeldOutErrors& errors, const NullFit& variances) {
+  constexpr double kLeast = 0.02;
+  const MatrixXd sigma2 = variance_of_runs(observations, variances, errors.rows);
+  const MatrixXd unit = scale_of_residuals(observations, errors);
+  return (2 - (errors.expected_std.array() / unit.array()).square() / sigma2.array()).cwiseMax(kLeast);
+}
+
 }  // namespace
 
 std::vector<SuspectRow> apart_from_their_block(const Observations& observations,
@@ -127,12 +137,9 @@ std::vector<SuspectRow> apart_from_their_block(const Observations& observations,
 
 std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
                                      const NullFit& variances, double dof) {
-  constexpr double kLeastLeft = 0.02;
   const MatrixXd sigma2 = variance_of_runs(observations, variances, errors.rows);
-  const MatrixXd unit = scale_of_residuals(observations, errors);
   MatrixXd residual = residuals_of(observations, errors);
-  const MatrixXd left =  // 1 − h
-      (2 - (errors.expected_std.array() / unit.array()).square() / sigma2.array()).cwiseMax(kLeastLeft);
+  const MatrixXd left = share_left(observations, errors, variances);
   VectorXd apart = distance_of_those_apart(observations, errors.rows, residual.rowwise().mean());
   residual.array() /= sigma2.array().sqrt();
   // A gross row under a rare condition may have been taken for scatter that goes with it, and others for
@@ -167,6 +174,50 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
     return std::abs(a.studentised) > std::abs(b.studentised);
   });
   return result;
+}
+
+std::vector<std::string> blocks_apart(const Observations& observations) {
+  constexpr double kFar = 20, kLeastFactor = 2;
+  constexpr std::size_t kFewestBlocks = 6, kFewestRows = 3;
+  if (!observations.from_table || observations.blocks_are_rows || observations.groups_within_blocks ||
+      !observations.multiplicative)
+    return {};
+  VectorXd away = observations.y.col(0);
+  for (const auto& [group, rows] : places_of_each(observations.group)) {
+    const VectorXd own = away(rows);
+    away(rows).array() -= upper_median({own.begin(), own.end()});
+  }
+  const double sigma = sigma_by_median(away.cwiseAbs());
+  std::vector<std::string> result;
+  const auto blocks = places_of_each(observations.block);
+  for (const auto& [block, rows] : blocks) {
+    const VectorXd own = away(rows);
+    const double middle = upper_median({own.begin(), own.end()});
+    if (blocks.size() < kFewestBlocks || rows.size() < kFewestRows || !(sigma > 0) ||
+        std::abs(middle) < std::max(kFar * sigma, std::log(kLeastFactor)))
+      continue;
+    result.push_back(fmt::format("{} of block {} is {:.3g} times what the others let expect: another unit?",
+                                 observations.response,
+                                 observations.block_name[static_cast<std::size_t>(block)], std::exp(middle)));
+  }
+  return result;
+}
+
+std::optional<SuspectRow> lone_row(const Observations& observations) {
+  constexpr double kFewest = 8;
+  const std::vector<int> rows = observations.all_rows();
+  if (!observations.from_table || !observations.other_axes.empty()) return {};
+  const JointFit baseline = fit_jointly(observations, {}, rows);
+  const double dof = degrees_of_freedom(observations, baseline, rows);
+  if (dof < kFewest) return {};
+  const HeldOutErrors fitted = score(observations, baseline, rows, rows);
+  const MatrixXd left = share_left(observations, fitted, baseline.variances);
+  const VectorXd apart = distance_of_those_apart(
+      observations, rows, residuals_of(observations, fitted).cwiseQuotient(left).rowwise().mean());
+  Index row = 0;
+  if ((apart.array() != 0).count() != 1) return {};
+  apart.cwiseAbs().maxCoeff(&row);
+  return SuspectRow{.row = observations.name[static_cast<std::size_t>(row)], .studentised = apart(row)};
 }
 
 std::optional<SuspectRow> gross_row(const Observations& observations) {

@@ -46,12 +46,17 @@ Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vect
   return fit;
 }
 
-/// What runs scatter, σ² U Φ U of (2); neighbours are those of the same block among `rows`.
+/// What runs and their sessions scatter, σ² (U Φ U + a J) of (2); neighbours are those of the same block
+/// among `rows`.
 class RunCovariance {
  public:
   RunCovariance(const Observations& observations, const std::vector<int>& rows, const VectorXd& scatter,
-                double sigma, double run_correlation)
-      : std_(sigma * scatter), place_(rows.size()), block_(rows.size()), correlation_(run_correlation) {
+                double sigma, double ratio, double run_correlation)
+      : std_(sigma * scatter),
+        session_(sigma * sigma * ratio),
+        place_(rows.size()),
+        block_(rows.size()),
+        correlation_(run_correlation) {
     for (const auto& [block, runs] : places_of_each(observations.block, rows))
       for (std::size_t i = 0; i < runs.size(); ++i) {
         place_[static_cast<std::size_t>(runs[i])] = static_cast<double>(i);
@@ -67,14 +72,17 @@ class RunCovariance {
                                  });
   }
 
+  VectorXd std(const std::vector<Index>& of) const { return std_(of); }
+
  private:
   double of(std::size_t a, std::size_t b) const {
     if (block_[a] != block_[b]) return 0;
-    return std_(static_cast<Index>(a)) * std_(static_cast<Index>(b)) *
-           std::pow(correlation_, std::abs(place_[a] - place_[b]));
+    return session_ + std_(static_cast<Index>(a)) * std_(static_cast<Index>(b)) *
+                          std::pow(correlation_, std::abs(place_[a] - place_[b]));
   }
 
   VectorXd std_;
+  double session_;
   std::vector<double> place_;  // of a run within its block
   std::vector<int> block_;
   double correlation_;
@@ -98,7 +106,7 @@ void own_baseline(const Observations& observations, const std::vector<int>& rows
       return x;
     };
     const MatrixXd of_fitted = covariance(fitted, fitted), shared = covariance(scored, fitted);
-    const VectorXd weight = of_fitted.diagonal().cwiseSqrt().cwiseInverse();
+    const VectorXd weight = covariance.std(fitted).cwiseInverse();
     const MatrixXd x = weight.asDiagonal() * design(fitted), wanted = design(scored);
     if (x.rows() < x.cols()) continue;
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(x);
@@ -191,7 +199,8 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     MatrixXd variances = Eigen::Map<const MatrixXd>(variance.data(), n, stratum.modes);
     if (stratum.means() && (observations.groups_within_blocks || !observations.held_out.empty()))
       own_baseline(observations, test_rows,
-                   RunCovariance(observations, test_rows, scatter, null.sigma[s], model.run_correlation(s)),
+                   RunCovariance(observations, test_rows, scatter, null.sigma[s], kRatios[null.ratio[s]],
+                                 model.run_correlation(s)),
                    Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes), stacked, fit.covariance,
                    errors, variances);
     parts.push_back(whitened(observations, test_rows, errors, scatter, null.sigma[s], kRatios[null.ratio[s]],

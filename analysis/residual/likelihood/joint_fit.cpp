@@ -14,6 +14,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+bool is_at_bound(const Term& term, std::size_t k) {
+  const EffectParameter& parameter = term.effect->parameters[k];
+  const double margin = 1e-6 * (parameter.upper - parameter.lower);
+  return term.parameters[k] <= parameter.lower + margin || term.parameters[k] >= parameter.upper - margin;
+}
+
 /// Where a parameter of the model stands.
 struct FreeParameter {
   std::size_t term = 0, parameter = 0;
@@ -97,7 +103,7 @@ class Residuals : public ceres::CostFunction {
     MeanModel model = model_;
     for (std::size_t i = 0; i < free_.size(); ++i)
       model.terms[free_[i].term].parameters[free_[i].parameter] = parameters[0][i];
-    const LinearModel linear = linearise(observations_, {model.terms, {}}, forces_);
+    const LinearModel linear = linearise(observations_, {model.terms, {}}, forces_, Shapes::kAll);
     std::vector<const Components*> items = {&linear.offset};
     for (const Components& column : linear.columns) items.push_back(&column);
     const MatrixXd whitened = whitener_(items);
@@ -300,7 +306,8 @@ MatrixXd predict_response(const Observations& observations, const MeanModel& mod
   return predict_forces(observations, model, rows).predicted;
 }
 
-LinearModel linearise(const Observations& observations, const MeanModel& model, const Forces& forces) {
+LinearModel linearise(const Observations& observations, const MeanModel& model, const Forces& forces,
+                      Shapes shapes) {
   LinearModel linear{
       Components(1 + observations.shape.size(), MatrixXd::Zero(observations.rows(), observations.channels())),
       {}};
@@ -311,7 +318,8 @@ LinearModel linearise(const Observations& observations, const MeanModel& model, 
     TermResponse response = respond(term, observations, forces.acted_on[t]);
     for (std::size_t k = 0; k < linear.offset.size(); ++k) linear.offset[k] += response.value[k];
     for (std::size_t k = 0; k < response.derivative.size(); ++k)
-      if (is_free(term, k)) linear.columns.push_back(std::move(response.derivative[k]));
+      if (is_free(term, k) && (k == 0 || shapes == Shapes::kAll || !is_at_bound(term, k)))
+        linear.columns.push_back(std::move(response.derivative[k]));
   }
   for (const Curve& curve : model.curves)
     linear.columns.insert(linear.columns.end(), curve.columns.begin(), curve.columns.end());
@@ -354,11 +362,9 @@ JointFit fit_jointly(const Observations& observations, const MeanModel& start, c
   fit.linear = linearise(observations, fit.model, predict_forces(observations, fit.model, rows));
   fit.variances = CandidateScan(mixed, fit.linear.columns, {}).null_fit(difference(y, fit.linear.offset));
   for (const FreeParameter& f : free_parameters(fit.model)) {
-    const EffectParameter& parameter = fit.model.terms[f.term].effect->parameters[f.parameter];
-    const double value = fit.model.terms[f.term].parameters[f.parameter];
-    const double margin = 1e-6 * (parameter.upper - parameter.lower);
-    if (value <= parameter.lower + margin || value >= parameter.upper - margin)
-      fit.at_bound.push_back(fit.model.terms[f.term].label() + " " + parameter.name);
+    const Term& term = fit.model.terms[f.term];
+    if (is_at_bound(term, f.parameter))
+      fit.at_bound.push_back(term.label() + " " + term.effect->parameters[f.parameter].name);
   }
   return fit;
 }

@@ -46,7 +46,10 @@ Components difference(const Components& a, const Components& b);
 /// y less columns times their amplitudes.
 Components without(Components y, const std::vector<Components>& columns, const Eigen::VectorXd& amplitude);
 
-LinearModel linearise(const Observations& observations, const MeanModel& model, const Forces& forces);
+/// Which shapes of the terms have columns: one that has come to a bound is fitted by none.
+enum class Shapes { kWithinBounds, kAll };
+LinearModel linearise(const Observations& observations, const MeanModel& model, const Forces& forces,
+                      Shapes shapes = Shapes::kWithinBounds);
 
 struct JointFit {
   MeanModel model;

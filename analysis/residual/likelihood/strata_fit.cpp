@@ -155,12 +155,13 @@ double StrataFit::residual(const Data& data, Index set, int candidate, std::size
 }
 
 StrataFit::State StrataFit::best_without(const Data& data, Index set) const {
+  constexpr double kRounding = 1e-7;  // where no two blocks share a group, all ratios are as likely
   State best{.ratio = std::vector<std::size_t>(model_.strata().size(), 0), .rss = {}, .amplitude = {}};
   for (std::size_t s = 0; s < best.ratio.size(); ++s) {
     double highest = -std::numeric_limits<double>::infinity();
     for (std::size_t ratio = 0; ratio < model_.ratios(); ++ratio) {
       const double value = stratum_likelihood(s, ratio, data[s][ratio].squares(set));
-      if (value > highest) {
+      if (value > highest + kRounding) {
         highest = value;
         best.ratio[s] = ratio;
       }

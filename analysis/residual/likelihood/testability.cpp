@@ -114,8 +114,9 @@ std::string against_origin(const Effect& effect, const Observations& observation
     case EffectOrigin::kCellInAir:
       return power ? kPower : number ? kNumber : "";
     case EffectOrigin::kWind:
-      if (!observations.of_no_cell && !is_of("pressure", observations)) return "";
-      return "nothing says that the response is a rotor's, through which the wind would go";
+      if (!observations.from_table || observations.of_air || observations.coefficient) return "";
+      return "nothing says that the response is a rotor's, through which the wind would go: give it its "
+             "meaning";
     case EffectOrigin::kSpeedSquared:
       if (observations.coefficient) return "the measured speed is part of the response";
       if (goes_with_speed_squared(observations)) return "";

@@ -64,8 +64,8 @@ class AtZero {
     if (covariate.name == "hours_in_session")
       return covariate.value(row, 0) + (at.start_s - run(row).start_s) / 3600;
     if (covariate.name == "mains_amplitude_V")
-      return amplitude_of_lines_V(data_.statistics.at(at.run).channels[static_cast<std::size_t>(channel)],
-                                  is_mains);
+      return mains_amplitude_V(data_.statistics.at(at.run).channels[static_cast<std::size_t>(channel)],
+                               data_.info.daq);
     if (const auto value = condition(at, covariate.name)) return *value;
     lacking_[covariate.name].insert(tare);
     return nearest(covariate, at);
@@ -110,13 +110,6 @@ std::optional<double> condition(const Run& run, const std::string& name) {
   if (name == kGroundDistance) return distance_of(run.location, "GND");
   if (name == kCeilingDistance) return distance_of(run.location, "CEIL");
   return {};
-}
-
-double amplitude_of_lines_V(const ChannelStatistics& channel, bool (*chosen)(std::string_view name)) {
-  double amplitude_V = 0;
-  for (const SpectralLine& line : channel.lines)
-    if (chosen(line.name)) amplitude_V += line.amplitude_V;
-  return amplitude_V;
 }
 
 void set_conditions_at_zero(const CampaignData& data, const Reduction& reduction,

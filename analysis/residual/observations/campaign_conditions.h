@@ -15,8 +15,13 @@ namespace tunnelrig {
 /// A condition of a run; distances to ground and ceiling, if no column says them, by the label (GND1.25).
 std::optional<double> condition(const Run& run, const std::string& name);
 
-/// Of those of a channel's lines together whose name `chosen` accepts.
-double amplitude_of_lines_V(const ChannelStatistics& channel, bool (*chosen)(std::string_view name));
+/// Of the lines of the mains, and of a shaft's that cannot be told from them.
+double mains_amplitude_V(const ChannelStatistics& channel, const Daq& daq);
+
+/// What the raw data show: amplitudes of lines and the share of clipped samples, by channel. `of_rows`: null
+/// where a run has none.
+void add_raw_conditions(const std::vector<const RunStatistics*>& of_rows, const Daq& daq,
+                        Observations& observations);
 
 /// Sets Covariate::at_zero of what effects of a zero follow, where runs have their zero by tares. `order`: of
 /// reduction.runs, by row. A tare whose row of the sheet lacks a condition counts as having that of the run

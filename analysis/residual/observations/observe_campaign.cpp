@@ -125,36 +125,6 @@ void add_texts(const Source& source, Observations& result) {
   }
 }
 
-/// Amplitudes of lines whose name `chosen` accepts, and the share of clipped samples, per channel.
-void add_raw_covariates(const Source& source, Observations& result) {
-  Index missing = 0;
-  for (Index row = 0; row < source.rows(); ++row) missing += source.statistics(row) == nullptr ? 1 : 0;
-  if (missing == source.rows()) return;
-  const auto add = [&](const std::string& name, const auto& value_of) {
-    if (result.find(name) != nullptr) return;  // a column of runs.csv goes before
-    Covariate covariate{name, MatrixXd::Constant(source.rows(), result.channels(), kNaN), true};
-    for (Index row = 0; row < source.rows(); ++row)
-      for (Index c = 0; c < result.channels() && source.statistics(row) != nullptr; ++c)
-        covariate.value(row, c) =
-            value_of(*source.statistics(row), source.statistics(row)->channels[static_cast<std::size_t>(c)]);
-    if (missing > 0)
-      result.not_usable[name] = fmt::format("missing in {} of {} runs", missing, source.rows());
-    result.covariates.push_back(std::move(covariate));
-  };
-  const auto lines = [](bool (*chosen)(std::string_view)) {
-    return [chosen](const RunStatistics&, const ChannelStatistics& channel) {
-      return amplitude_of_lines_V(channel, chosen);
-    };
-  };
-  add("clip_fraction", [](const RunStatistics& run, const ChannelStatistics& channel) {
-    return static_cast<double>(channel.clipped) / static_cast<double>(run.frames);
-  });
-  add("mains_amplitude_V", lines(is_mains));
-  add("alias_amplitude_V", lines([](std::string_view name) { return name.find("alias") != name.npos; }));
-  add("vibration_amplitude_V",
-      lines([](std::string_view name) { return name == "shaft" || name == "blade_pass"; }));
-}
-
 /// Hours since the session's first run, hour of the day, the run's number, and the trend of the air's
 /// temperature.
 void add_derived_covariates(const Source& source, Observations& result) {
@@ -205,8 +175,17 @@ int index_in(std::vector<std::string>& names, const std::string& name) {
   return static_cast<int>(names.size()) - 1;
 }
 
+/// Start times of each session's thrust runs, used or not.
+std::map<std::string, std::set<double>> starts_s(const CampaignData& data) {
+  std::map<std::string, std::set<double>> result;
+  for (const Run& run : data.runs)
+    if (run.kind == RunKind::kThrust) result[run.session].insert(run.start_s);
+  return result;
+}
+
 void set_belonging(const Source& source, Observations& result) {
   std::map<std::string, int> last;
+  const std::map<std::string, std::set<double>> all_starts_s = starts_s(source.data);
   for (Index row = 0; row < source.rows(); ++row) {
     const Run& run = source.run(row);
     result.name.push_back(run.run);
@@ -214,7 +193,11 @@ void set_belonging(const Source& source, Observations& result) {
     result.block.push_back(index_in(result.block_name, run.session));
     result.in_tunnel.push_back(run.in_tunnel());
     const auto before = last.find(run.session);
-    result.previous.push_back(before == last.end() ? -1 : before->second);
+    const std::set<double>& starts = all_starts_s.at(run.session);
+    // A run that is left out loaded the cell as well, and nobody predicts it.
+    const bool next = before != last.end() &&
+                      starts.upper_bound(source.run(before->second).start_s) == starts.find(run.start_s);
+    result.previous.push_back(next ? before->second : -1);
     last[run.session] = static_cast<int>(row);
   }
 }
@@ -340,7 +323,9 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
   add_sheet_covariates(source, result);
   add_texts(source, result);
   add_derived_covariates(source, result);
-  add_raw_covariates(source, result);
+  std::vector<const RunStatistics*> statistics;
+  for (Index row = 0; row < source.rows(); ++row) statistics.push_back(source.statistics(row));
+  add_raw_conditions(statistics, data.info.daq, result);
   // A column explains itself, and what is made of it.
   std::erase_if(result.covariates, [&](const Covariate& covariate) {
     return covariate.name == result.response ||

@@ -156,16 +156,18 @@ void set_belonging(const TableSource& source, Observations& result) {
   result.previous.assign(result.group.size(), -1);
 }
 
-/// Place of a row's value within its group, 0 to 1.
+/// Place of a row's value within its group, 0 to 1; NaN where the cell is empty.
 VectorXd ranks(const TableSource& source, const Observations& result, const std::string& column) {
-  VectorXd rank(source.count());
+  std::vector<double> rank(result.group.size(), std::numeric_limits<double>::quiet_NaN());
   for (auto& [group, rows] : places_of_each(result.group)) {
+    std::erase_if(rows, [&](Index r) { return std::isnan(source.cell(r, column)); });
     std::stable_sort(rows.begin(), rows.end(),
                      [&](Index a, Index b) { return source.cell(a, column) < source.cell(b, column); });
     for (std::size_t k = 0; k < rows.size(); ++k)
-      rank(rows[k]) = (static_cast<double>(k) + 0.5) / static_cast<double>(rows.size());
+      rank[static_cast<std::size_t>(rows[k])] =
+          (static_cast<double>(k) + 0.5) / static_cast<double>(rows.size());
   }
-  return rank;
+  return Eigen::Map<const VectorXd>(rank.data(), source.count());
 }
 
 std::vector<bool> held_out_rows(const TableSource& source, const Observations& result,
@@ -182,7 +184,12 @@ std::vector<bool> held_out_rows(const TableSource& source, const Observations& r
   std::vector<double> values(columns.size());
   std::vector<bool> held_out;
   for (Index r = 0; r < source.count(); ++r) {
-    for (std::size_t k = 0; k < columns.size(); ++k) values[k] = columns[k](r);
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      values[k] = columns[k](r);
+      if (std::isnan(values[k]))
+        throw InputError::in(source.row(r).place, "{} is empty here, so hold_out is neither true nor false",
+                             expression.names()[k]);
+    }
     const double held = expression(values);
     if (held != 0 && held != 1)
       throw InputError::in(source.row(r).place,

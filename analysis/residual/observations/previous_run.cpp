@@ -26,10 +26,20 @@ bool in_one_group(const Observations& observations, Index row, int other) {
 }  // namespace
 
 MatrixXd variance_of_constants(const Observations& observations, const MatrixXd& predicted) {
-  const MatrixXd left = observations.y - scaled(observations, predicted);
+  MatrixXd left = observations.y - scaled(observations, predicted);
   VectorXd count = VectorXd::Zero(observations.groups());
   for (Index row = 0; row < observations.rows(); ++row)
     if (observations.has_response(row)) count(observations.group[static_cast<std::size_t>(row)]) += 1;
+  if (observations.is_line()) {  // its force has no zero, which is no scatter
+    const MatrixXd seen = left.array().isNaN().select(0, left);
+    MatrixXd sum = MatrixXd::Zero(observations.groups(), left.cols());
+    for (Index row = 0; row < left.rows(); ++row)
+      sum.row(observations.group[static_cast<std::size_t>(row)]) += seen.row(row);
+    for (Index row = 0; row < left.rows(); ++row) {
+      const Index group = observations.group[static_cast<std::size_t>(row)];
+      left.row(row) -= sum.row(group) / std::max(count(group), 1.0);
+    }
+  }
   const double free = count.sum() - static_cast<double>((count.array() > 0).count());
   const Eigen::RowVectorXd variance =
       left.array().isNaN().select(0, left).colwise().squaredNorm() / std::max(free, 1.0);

@@ -67,6 +67,18 @@ double rest_beside(const VectorXd& x, const VectorXd& y) {
   return (rest - slope * from_mean).squaredNorm();
 }
 
+/// The others: a speed twice as high as those of nine rows in ten is an error, and would decide alone.
+std::vector<Index> without_wild_speeds(const VectorXd& squares, const std::vector<Index>& rows) {
+  constexpr double kTwice = 4;  // of its square
+  std::vector<double> sorted(squares.begin(), squares.end());
+  const auto high = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 9 / 10);
+  std::nth_element(sorted.begin(), high, sorted.end());
+  std::vector<Index> result;
+  for (Index r = 0; r < squares.size(); ++r)
+    if (squares(r) <= kTwice * *high) result.push_back(rows[static_cast<std::size_t>(r)]);
+  return result;
+}
+
 /// A tachometer does not see the direction, a thrust of both directions does: n|n| in place of n² where a
 /// group's thrusts follow that.
 void turn_reversed(const VectorXd& thrust_N, Observations& result) {
@@ -74,12 +86,13 @@ void turn_reversed(const VectorXd& thrust_N, Observations& result) {
   constexpr Index kOneOf = 10;  // fewer are errors
   std::vector<std::string> reversed;
   for (const auto& [group, rows] : places_of_each(result.group)) {
-    const VectorXd y = thrust_N(rows), known = result.known(rows, 0);
+    const std::vector<Index> sound = without_wild_speeds(result.known(rows, 0), rows);
+    const VectorXd y = thrust_N(sound), known = result.known(sound, 0);
     const VectorXd directed = known.array() * y.array().sign();
     const Index forward = (y.array() > 0).count();
     if (kOneOf * std::min(forward, y.size() - forward) < y.size()) continue;
     if (!(rest_beside(directed, y) < kClearly * rest_beside(known, y))) continue;
-    result.known(rows, 0) = directed;
+    result.known(rows, 0).array() *= thrust_N(rows).array().sign();
     reversed.push_back(result.group_name[static_cast<std::size_t>(group)]);
   }
   if (!reversed.empty())

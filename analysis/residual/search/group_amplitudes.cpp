@@ -25,7 +25,34 @@ VectorXd amplitudes_of(const Observations& observations, const JointFit& fit, st
   return values_by_group(observations, estimates);
 }
 
+/// Of neighbouring rows of a group. Those with other groups' rows between them are no neighbours.
+double correlation_within(const Observations& observations, const std::vector<int>& rows) {
+  for (const auto& [block, own] : rows_of_each(observations.block, rows))
+    for (std::size_t k = 1; k < own.size(); ++k)
+      for (int between = own[k - 1] + 1; between < own[k]; ++between)
+        if (observations.block[static_cast<std::size_t>(between)] == block) return 0;
+  return observations.scatter.run_correlation[0];
+}
+
 }  // namespace
+
+double likelihood_beside_own(const Observations& observations, const NullFit& fit,
+                             const std::vector<int>& rows) {
+  double log_size = 0;
+  const Index own_columns = observations.beyond.cols();
+  for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
+    const VectorXd weight = observations.scatter.of_runs(own).cwiseInverse();
+    const MatrixXd slopes = weight.asDiagonal() * observations.slopes(own, Eigen::all);
+    MatrixXd others(weight.size(), 1 + observations.first_own_slope());
+    others << weight, slopes.leftCols(observations.first_own_slope());
+    const MatrixXd columns = slopes.rightCols(own_columns);
+    const MatrixXd seen = columns - others * others.completeOrthogonalDecomposition().solve(columns);
+    const VectorXd sizes = Eigen::ColPivHouseholderQR<MatrixXd>(seen).matrixR().diagonal().cwiseAbs();
+    for (const double size : sizes)
+      if (size > kLeastSeen * columns.norm()) log_size += std::log(size);
+  }
+  return fit.log_likelihood + log_size;
+}
 
 VectorXd values_by_group(const Observations& observations, const std::vector<GroupEstimate>& estimates) {
   VectorXd result = VectorXd::Zero(observations.groups());
@@ -142,16 +169,18 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
                                              std::size_t t, const NullFit& variances,
                                              const std::vector<int>& rows) {
   const Index column = observations.first_own_slope() + place_among_own(model, t);
-  const Components offset = linearise(observations, model, predict_forces(observations, model, rows)).offset;
+  const LinearModel linear = linearise(observations, model, predict_forces(observations, model, rows));
+  const Components y = difference(response_components(observations), linear.offset);
+  const VectorXd curves = fit_amplitudes(observations, y, linear.columns, variances, rows).amplitude;
+  const VectorXd left_of_y = without(y, linear.columns, curves)[0].col(0);
   std::vector<GroupEstimate> result;
   for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
     const Index n = static_cast<Index>(own.size()), k = observations.slopes.cols();
     MatrixXd items(n, k + 2);  // constant and other columns, then x and y
-    items << VectorXd::Ones(n), observations.slopes(own, Eigen::all),
-        observations.y(own, 0) - offset[0](own, 0);
+    items << VectorXd::Ones(n), observations.slopes(own, Eigen::all), left_of_y(own);
     items.col(1 + column).swap(items.col(k));
     whiten(without_numbers(places_of_each(observations.block, own)), observations.scatter.of_runs(own),
-           kRatios[variances.ratio[0]], 0, items);
+           kRatios[variances.ratio[0]], correlation_within(observations, own), items);
     // What the group's other columns make of both is no part of the amplitude (Frisch & Waugh 1933).
     const MatrixXd others = items.leftCols(k);
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(others);

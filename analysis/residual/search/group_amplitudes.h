@@ -20,6 +20,12 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
                                              std::size_t t, const NullFit& variances,
                                              const std::vector<int>& rows);
 
+/// What may be compared between places of a step or time constants of effects with an amplitude of each
+/// group's own. Their columns are slopes of the baseline: the restricted likelihood, of what is left beside
+/// it, is the larger the less these columns do, whatever they explain (Harville 1974). Without that.
+double likelihood_beside_own(const Observations& observations, const NullFit& fit,
+                             const std::vector<int>& rows);
+
 /// By group; 0 where the estimates have none.
 Eigen::VectorXd values_by_group(const Observations& observations,
                                 const std::vector<GroupEstimate>& estimates);

@@ -122,7 +122,8 @@ class Search {
   bool is_gradual(const std::vector<Term>& steps, const NullFit& variances,
                   const CrossValidation& with_steps) const;
   /// Of the runs' means within the fit, and its degrees of freedom.
-  std::pair<double, double> sum_of_squares(const Observations& observations, const JointFit& fit) const;
+  std::pair<double, double> sum_of_squares(const Observations& observations, const JointFit& fit,
+                                           const NullFit& variances) const;
   /// A joint fit with one term more; theory's coefficient where the data do not speak against it.
   JointFit fit_with(Term term, double amplitude) const;
   /// p of a likelihood ratio of one parameter of a fitted model: few rows are no large sample.

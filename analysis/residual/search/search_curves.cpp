@@ -275,7 +275,8 @@ std::optional<int> Search::session_scatter_is_large() const {
         below += fit_.variances.ratio_probability[s][r];
     }
     if (below >= 0.025) continue;
-    const bool own = unlike.rotors.size() == 1 && mixed_->strata()[s].first_mode < unlike.alone;
+    const Index mode = mixed_->strata()[s].first_mode;  // the first is what all have in common
+    const bool own = unlike.rotors.size() == 1 && mode > 0 && mode < unlike.alone;
     if (!own) return -1;
     rotor = unlike.rotors[0];
   }

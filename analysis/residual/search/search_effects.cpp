@@ -28,8 +28,9 @@ double prior_weight(const Term& term, const Observations& observations, std::siz
   // Of a C_T that goes with the speed a cell that bends as much is the rarest cause.
   const bool bent_cell = effect.origin == EffectOrigin::kCharacteristic && observations.coefficient;
   if (effect.rare || bent_cell) weight /= kRareWeight;
-  if (effect.scope == EffectScope::kRotor && term.rotor >= 0) weight /= 4;
-  if (effect.scope == EffectScope::kPair) weight /= 12;
+  const auto rotors = static_cast<double>(observations.channels());
+  if (effect.scope == EffectScope::kRotor && term.rotor >= 0) weight /= rotors;
+  if (effect.scope == EffectScope::kPair) weight /= std::max(1.0, rotors * (rotors - 1));
   if (effect.has_change_point()) weight /= std::max<double>(1, static_cast<double>(ways));
   return weight;
 }
@@ -140,7 +141,7 @@ bool Search::add_best_effect() {
   const double p = maxima.p(scan.fits[scan.order[0]].evidence);
   if (p <= settings_.alpha || critical_ == 0) critical_ = maxima.critical();
   round.observed = scan.fits[scan.order[0]].evidence;
-  round.critical = critical_;
+  round.critical = p <= settings_.alpha ? critical_ : critical_of(maxima.values(), settings_.alpha);
   round.ranking = ranking(scan, maxima);
   round.null_maxima = maxima.values();
   if (result_.rounds.empty()) set_detectable(scan);
@@ -209,6 +210,11 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
     const LossDifference gain = compare(unseen(fit_, fit.variances), after);
     if (const auto reason = why_not(fit, after, gain)) {
       round.outcome += *reason + "; ";
+      if (scan.ways[best].per_group &&
+          accept_in_groups(scan.ways[best], maxima.p(scan.fits[best].evidence))) {
+        round.outcome += "accepted " + result_.accepted.back().term.label();
+        return true;
+      }
       const Term& bounded = fit.model.terms.back();
       if (best == scan.order[0] && at_bound(fit, bounded) && !lacks_speed_squared(bounded))
         beyond = beyond_bounds(scan.ways[i], scan.fits[i].amplitude(0));

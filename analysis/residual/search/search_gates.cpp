@@ -88,7 +88,9 @@ JointFit Search::at_best_run(JointFit fit, std::size_t from_newest) {
     Observations moved = observations_;
     JointFit there = fit_with_parameter(step.effect->change_point().value(), profile.likeliest(), moved,
                                         fit.model, t, rows_);
-    if (there.variances.log_likelihood <= fit.variances.log_likelihood) return fit;
+    if (likelihood_beside_own(moved, there.variances, rows_) <=
+        likelihood_beside_own(observations_, fit.variances, rows_))
+      return fit;
     observations_ = std::move(moved);
     make_models();
     return there;

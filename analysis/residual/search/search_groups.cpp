@@ -90,7 +90,8 @@ void Search::take(InGroups own) {
     const double value = shape_profile(own.observations, own.fit, t, k, rows_).likeliest;
     Observations moved = own.observations;
     JointFit there = fit_with_parameter(k, value, moved, own.fit.model, t, rows_);
-    if (there.variances.log_likelihood > own.fit.variances.log_likelihood)
+    if (likelihood_beside_own(moved, there.variances, rows_) >
+        likelihood_beside_own(own.observations, own.fit.variances, rows_))
       own = {std::move(moved), std::move(there)};
   }
   observations_ = std::move(own.observations);
@@ -178,18 +179,26 @@ bool Search::groups_within_bounds(const Observations& wider, const JointFit& fit
 
 double Search::p_of_groups(const Observations& fewer, const JointFit& without, const Observations& wider,
                            const JointFit& with) const {
-  const auto before = sum_of_squares(fewer, without), after = sum_of_squares(wider, with);
+  // What groups differ by may look like sessions that differ: both by the sessions that the wider model
+  // leaves.
+  const auto before = sum_of_squares(fewer, without, with.variances),
+             after = sum_of_squares(wider, with, with.variances);
   const double more = before.second - after.second;
   if (more <= 0 || after.second <= 0) return 1;
   const double f = (before.first - after.first) / more / (after.first / after.second);
   return f > 0 ? f_upper_p(f, more, after.second) : 1;
 }
 
-std::pair<double, double> Search::sum_of_squares(const Observations& observations,
-                                                 const JointFit& fit) const {
-  const MixedModel mixed(observations, rows_);
+std::pair<double, double> Search::sum_of_squares(const Observations& observations, const JointFit& fit,
+                                                 const NullFit& variances) const {
+  const MixedModel mixed(observations, rows_, variances.ratio);
+  const Components y = difference(y_, fit.linear.offset);
+  const Components left = without(
+      y, fit.linear.columns, fit_amplitudes(observations, y, fit.linear.columns, variances, rows_).amplitude);
+  Stacked stacked = mixed.stack(0, {&left});
+  mixed.project(0, variances.ratio[0], stacked);
   const double dof = static_cast<double>(mixed.dof(0) - static_cast<Index>(fit.linear.columns.size()));
-  return {std::pow(fit.variances.sigma[0], 2) * std::max(dof, 1.0), dof};
+  return {stacked.squaredNorm(), dof};
 }
 
 }  // namespace tunnelrig

@@ -120,6 +120,10 @@ void Search::name_newest_curve(const JointFit& without) {
   const Scan scan = scan_effects(fit_);
   const double critical = scan.order.empty() ? 0 : maxima_of(fit_, scan, 6000 + ++salt_).critical();
   const CrossValidation of_curve = unseen(with_curve, with_curve.variances);
+  const auto left_of_curve = [&](const JointFit& beside) {
+    const CandidateScan alone(*mixed_, beside.linear.columns, {as_candidate(newest.curve)});
+    return alone.fit(difference(y_, beside.linear.offset))[0].likelihood_ratio;
+  };
   std::set<std::string> tried;
   for (const std::size_t i : scan.order) {
     if (scan.fits[i].evidence < critical) break;
@@ -129,6 +133,8 @@ void Search::name_newest_curve(const JointFit& without) {
     if (why_not(fit, after, compare(unseen(fit_, fit.variances), after)) ||
         compare(unseen(fit, with_curve.variances), of_curve).told_apart())
       continue;
+    if (2 * left_of_curve(fit) > left_of_curve(without))
+      continue;  // a small one of its own, beside the curve
     newest.could_be.push_back(fit.model.terms.back());
   }
   fit_ = with_curve;

@@ -33,9 +33,9 @@ class Likelihoods {
     own_.slopes.col(own_.first_own_slope() + place_) = own.derivative;
     own_.beyond.col(place_) = own.beyond(before_.amplitude);
     const LinearModel linear = linearise(own_, fit_.model, forces_);
-    return place->second = CandidateScan(MixedModel(own_, rows_), linear.columns, {})
-                               .null_fit(difference(response_components(own_), linear.offset))
-                               .log_likelihood;
+    const NullFit found = CandidateScan(MixedModel(own_, rows_), linear.columns, {})
+                              .null_fit(difference(response_components(own_), linear.offset));
+    return place->second = likelihood_beside_own(own_, found, rows_);
   }
 
   /// Of the values so far.

@@ -59,8 +59,8 @@ class StepLikelihoods {
     std::vector<double> result;
     for (auto row = first; row != last; ++row) {
       wide_->slopes.col(own_column_) = column_from(*row)[0];
-      result.push_back(
-          CandidateScan(MixedModel(*wide_, rows_), linear_.columns, {}).null_fit(y_).log_likelihood);
+      const NullFit fit = CandidateScan(MixedModel(*wide_, rows_), linear_.columns, {}).null_fit(y_);
+      result.push_back(likelihood_beside_own(*wide_, fit, rows_));
     }
     return result;
   }
