@@ -25,7 +25,6 @@ struct FlyOptions {
   std::uint64_t seed = 1;
   double lidar_sigma_mm = 10;
   HiddenTruth hidden;
-  bool weak_rotor_named = false;
 };
 
 struct NamedMap {
@@ -168,6 +167,23 @@ void check_none_lost(const FlyOptions& options) {
                       options.tune, name));
 }
 
+/// What would be left out in silence.
+void refuse_unused(const FlyOptions& options, const CLI::App& verb) {
+  if (!options.tune.empty())
+    refuse_given(verb,
+                 {"--json", "--out", "--gains", "--scenario", "--tunnel", "--runs", "--seed", "--position",
+                  "--lidar-sigma-mm", "--payload-kg", "--map-scale", "--wind-m-s", "--gust-m-s",
+                  "--motor-loss", "--weak-rotor"},
+                 "does not go with --tune, which flies the same flights whatever is said of them, and writes "
+                 "gains alone; fly with --gains afterwards");
+  else
+    refuse_given(verb, {"--budget"}, "is of tuning; it goes with --tune");
+  if (options.position == "given")
+    refuse_given(verb, {"--lidar-sigma-mm"}, "with --position given there is no LIDAR");
+  if (verb.count("--motor-loss") == 0)
+    refuse_given(verb, {"--weak-rotor"}, "says which rotor lost thrust; --motor-loss says how much");
+}
+
 int tune_all(const FlyOptions& options) {
   check_tuned(options.controllers);
   check_none_lost(options);
@@ -198,16 +214,17 @@ FlyOptions quiet_options(FlyOptions options) {
   return options;
 }
 
-int run_fly(const FlyOptions& given) {
+int run_fly(const FlyOptions& given, const CLI::App& verb) {
   const Processes processes;
   const FlyOptions options = processes.rank() > 0 ? quiet_options(given) : given;
   options.hidden.validate();
-  if (options.hidden.motor_loss > 0 && !options.weak_rotor_named)
+  if (options.hidden.motor_loss > 0 && verb.count("--weak-rotor") == 0)
     warn(fmt::format("--motor-loss without --weak-rotor: it is rotor {} that lost thrust",
                      options.hidden.weak_rotor));
   if (options.position != "lidar" && options.position != "lidar-thesis" && options.position != "given")
     throw InputError(fmt::format("--position {}: must be lidar, lidar-thesis or given", options.position));
   check_places(options);
+  refuse_unused(options, verb);
   if (!options.tune.empty()) return tune_all(options);
   const NamedMap map = map_of(options);
   const GainTable gains =
@@ -285,13 +302,10 @@ void add_fly(CLI::App& app, Work& work) {
                    "Undeclared: gusts along the tunnel, standard deviation");
   verb->add_option("--motor-loss", options->hidden.motor_loss,
                    "Undeclared: share of its thrust that a rotor lost");
-  const CLI::Option* weak = verb->add_option("--weak-rotor", options->hidden.weak_rotor,
-                                             "Which rotor that is, 1 to 4, numbered as the rig's")
-                                ->capture_default_str();
-  verb->callback([options, weak, &work] {
-    options->weak_rotor_named = weak->count() > 0;
-    work = [options] { return run_fly(*options); };
-  });
+  verb->add_option("--weak-rotor", options->hidden.weak_rotor,
+                   "Which rotor that is, 1 to 4, numbered as the rig's")
+      ->capture_default_str();
+  verb->callback([options, verb, &work] { work = [options, verb] { return run_fly(*options, *verb); }; });
 }
 
 }  // namespace tunnelrig::cli

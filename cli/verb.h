@@ -2,7 +2,9 @@
 #pragma once
 
 #include <functional>
+#include <initializer_list>
 #include <string>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 
@@ -29,5 +31,9 @@ void add_demo(CLI::App& app, Work& run);
 
 /// --model and --with, as every verb that reduces has them.
 void add_model_options(CLI::App& verb, std::string& model, std::string& terms);
+
+/// Throws InputError ("OPTION: WHY") where one of the options was given: what is asked for and would not be
+/// done is refused, not left out in silence.
+void refuse_given(const CLI::App& verb, std::initializer_list<const char*> options, std::string_view why);
 
 }  // namespace tunnelrig::cli

@@ -184,8 +184,7 @@ TEST_F(Fly, ATunnelThatTheVehicleDoesNotFitIsRefused) {
 
 TEST_F(Fly, AResultWithoutAPlaceIsRefusedBeforeItIsFlown) {
   for (const char* option : {"--json", "--tune"}) {
-    const ProgramResult result =
-        run(std::string("--scenario short.toml --controllers ibs --runs 1 --budget 10 ") + option + " no/x");
+    const ProgramResult result = run(std::string("--controllers ibs ") + option + " no/x");
     EXPECT_EQ(result.code, 2) << option;
     EXPECT_EQ(result.out, "") << option;
     EXPECT_THAT(result.error, HasSubstr("no/x: cannot be written: there is no folder no")) << option;
@@ -206,6 +205,17 @@ TEST_F(Fly, OtherBadOptionsAreRefused) {
   EXPECT_THAT(refusal("--payload-kg nan"), HasSubstr("--payload-kg nan: a number is required"));
   write_text(folder / "g.toml", "format = \"tunnelrig-gains/1\"\n[ibs]\nk1_y = -3\n");
   EXPECT_THAT(refusal("--gains g.toml"), HasSubstr("g.toml:3: ibs.k1_y must be a number from"));
+}
+
+TEST_F(Fly, OptionsThatWouldDoNothingAreRefused) {
+  for (const char* option : {"--json f.json", "--out f", "--seed 3", "--motor-loss 0.1", "--runs 2"})
+    EXPECT_THAT(refusal(std::string("--tune t.toml --budget 10 --controllers ibs ") + option),
+                HasSubstr("does not go with --tune"))
+        << option;
+  EXPECT_FALSE(std::filesystem::exists(folder / "t.toml"));
+  EXPECT_THAT(refusal("--budget 20"), HasSubstr("--budget: is of tuning"));
+  EXPECT_THAT(refusal("--weak-rotor 2"), HasSubstr("--weak-rotor: says which rotor"));
+  EXPECT_THAT(refusal("--position given --lidar-sigma-mm 20"), HasSubstr("there is no LIDAR"));
 }
 
 }  // namespace
