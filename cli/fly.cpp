@@ -1,5 +1,6 @@
 // tunnelrig fly: controllers through the thesis's scenarios in the simulated tunnel.
 #include "cli/console.h"
+#include "cli/fly_folder.h"
 #include "cli/fly_output.h"
 #include "cli/verb.h"
 #include "datasets/csv.h"
@@ -11,6 +12,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -99,9 +101,9 @@ std::vector<FlightLog> identification_flights(FlightTask task, const std::string
   return flights;
 }
 
-/// Flies one scenario; `gains` and `map` are shared by all.
+/// Flies one scenario; `gains` and `map` are shared by all. `out`: null where nothing is kept.
 FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, const NamedMap& map,
-                           const GainTable& gains, const Processes& processes) {
+                           const GainTable& gains, const Processes& processes, FlightsFolder* out) {
   const Airframe frame;
   const FlightSpace space(tunnel_from(one.tunnel), frame);
   const Scenario scenario = scenario_from(one.scenario, space, frame);
@@ -117,10 +119,10 @@ FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, c
     task.localisation->lidar.range_sigma_m = 1e-3 * options.lidar_sigma_mm;
     if (options.position == "lidar-thesis") task.localisation->filter = FlightFilter::thesis;
   }
-  const std::string extrapolated = extrapolation(map.map.geometry, space, frame);
-  if (!extrapolated.empty()) warn("extrapolated, in normalised coordinates: " + extrapolated);
-
-  FlownScenario flown{.tunnel = space.tunnel.name, .scenario = scenario.name};
+  FlownScenario flown{.tunnel = space.tunnel.name,
+                      .scenario = scenario.name,
+                      .extrapolated = extrapolation(map.map.geometry, space, frame)};
+  if (!flown.extrapolated.empty()) warn("extrapolated, in normalised coordinates: " + flown.extrapolated);
   const std::vector<std::string> names = controllers_of(options);
   ProgressBar progress("flying");
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -128,15 +130,14 @@ FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, c
       progress.show(static_cast<double>(i) * options.runs + done,
                     static_cast<double>(names.size()) * options.runs, names[i]);
     }));
-    if (options.out.empty()) continue;
+    if (out == nullptr) continue;
     flown.logs.push_back(fly_logged(task, names[i], gains));
     flown.identification.push_back(identification_flights(task, names[i], gains));
   }
-  if (!options.out.empty()) {
-    const bool all = options.scenario == "all";
-    const auto folder = std::filesystem::path(options.out) / (all ? flown.tunnel + "-" + flown.scenario : "");
+  if (out != nullptr) {
     std::string warning;
-    write_flown(folder, flown, task, warning);
+    out->add(options.scenario == "all" ? scenario_folder(flown.tunnel, flown.scenario) : "", flown, task,
+             warning);
     if (!warning.empty()) warn(warning);
     flown.for_report = flight_for_report(flown, task, map.name);
     flown.logs.clear();
@@ -232,21 +233,21 @@ int run_fly(const FlyOptions& given, const CLI::App& verb) {
   const bool programme = options.scenario == "all";
   const std::vector<PlaceAndPath> wanted = programme_of(options);
   check_all(options, wanted, gains);
-  const FoldersForOutput made(options.out);
-  if (!options.out.empty()) make_folder(options.out);
+  std::optional<FlightsFolder> out;
+  if (!options.out.empty()) out.emplace(options.out);
   std::vector<FlownScenario> flown;
   fmt::print("SIMULATED flights; map: {}\n\n", map.name);
   for (const PlaceAndPath& one : wanted) {
-    flown.push_back(fly_scenario(options, one, map, gains, processes));
+    flown.push_back(fly_scenario(options, one, map, gains, processes, out ? &*out : nullptr));
     print_flown(flown.back());
   }
   if (programme) print_beside_thesis(flown);
-  if (!options.out.empty()) {
+  if (!options.json.empty()) write_text(options.json, flown_json(flown, map.name, options.seed, programme));
+  if (out) {
     std::vector<std::string> shown;
     for (const FlownScenario& one : flown) shown.push_back(one.for_report);
-    write_text(std::filesystem::path(options.out) / "flights.json", flights_json(shown, arguments()));
+    out->publish(flights_json(shown, arguments()));
   }
-  if (!options.json.empty()) write_text(options.json, flown_json(flown, map.name, options.seed, programme));
   return kWell;
 }
 

@@ -145,13 +145,31 @@ TEST_F(Fly, OutHoldsLogsTablesAndPictures) {
     EXPECT_GT(std::filesystem::file_size(folder / "flights" / file), 500U) << file;
 }
 
+TEST_F(Fly, WhatWasFlownBeforeIntoTheSameFolderGoes) {
+  const std::string short_flight = "--scenario short.toml --runs 1 --out flights --controllers ";
+  ASSERT_EQ(run(short_flight + "ibs,indi").code, 0);
+  write_text(folder / "flights/notes.txt", "mine");
+  ASSERT_EQ(run(short_flight + "ibs").code, 0);
+  for (const char* gone : {"indi.csv", "indi-residual.csv"})
+    EXPECT_FALSE(std::filesystem::exists(folder / "flights" / gone)) << gone;
+  for (const char* kept : {"ibs.csv", "notes.txt", "flights.json", "comparison.csv"})
+    EXPECT_TRUE(std::filesystem::exists(folder / "flights" / kept)) << kept;
+}
+
 TEST_F(Fly, AScenarioFlownInTheTunnelThatItAsksFor) {
   std::string text = kShort;
   text.insert(text.find("[["), "tunnel = \"2.4\"\n");
   write_text(folder / "large.toml", text);
   EXPECT_EQ(flown("--scenario large.toml --controllers ibs --runs 1")["tunnel"], "2.4");
   EXPECT_EQ(flown("--scenario large.toml --tunnel 1.5 --controllers ibs --runs 1")["tunnel"], "1.5");
-  EXPECT_THAT(run("--scenario large.toml --controllers ibs --runs 1").error, HasSubstr("extrapolated"));
+  const ProgramResult result = run("--scenario large.toml --controllers ibs --runs 1 --out f --json f.json");
+  EXPECT_THAT(result.error, HasSubstr("extrapolated"));
+  EXPECT_THAT(result.out, HasSubstr("large in the 2.4 tunnel, 1 runs, extrapolated"));
+  const auto differs = HasSubstr("the map is of a tunnel of 1.5 x 1.5 m");
+  EXPECT_THAT(json::parse(read_text(folder / "f.json"))["extrapolated"].get<std::string>(), differs);
+  const json flights = json::parse(read_text(folder / "f/flights.json"));
+  EXPECT_THAT(flights["flights"][0]["extrapolated"].get<std::string>(), differs);
+  EXPECT_TRUE(flown("--scenario short.toml --controllers ibs --runs 1")["extrapolated"].is_null());
 }
 
 TEST_F(Fly, WhatIsNoMapIsRefused) {
