@@ -140,6 +140,10 @@ TEST_F(BadInput, OptionsAndFilesThatAreNotThere) {
   EXPECT_THAT(refusal_of("import t.csv --format table --db c.db", {}),
               HasSubstr("--schema S.toml is required"));
   EXPECT_THAT(refusal_of("fly --now", {}), testing::Not(testing::IsEmpty()));
+  EXPECT_THAT(refusal_of("mapp --db c.db", {}), HasSubstr("mapp: there is no such verb"));
+  EXPECT_THAT(refusal_of("", {}), HasSubstr("A subcommand is required"));
+  EXPECT_THAT(refusal_of("fly --seed -1", {}), HasSubstr("--seed -1: must not be below 0"));
+  EXPECT_THAT(refusal_of("map --db c.db --out m --method foo", {}), HasSubstr("--method: 'foo' is no map"));
   EXPECT_THAT(refusal_of("log --db c.db --plan none.csv", {}), HasSubstr("none.csv: cannot be read"));
 }
 
