@@ -4,6 +4,7 @@
 #include "analysis/misread_runs.h"
 #include "analysis/reduction.h"
 #include "datasets/error.h"
+#include "datasets/recorded_rate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +19,6 @@ namespace {
 
 constexpr double kSpeedTolerance = 0.003;    // of the nominal speed, the thesis's ±15 rev/min
 constexpr double kTachometerAgrees = 0.005;  // shaft line against tachometer
-constexpr double kRateAgrees = 1e-3;         // board's clock against campaign.toml
 
 class Fitness : public Findings {
  public:
@@ -235,8 +235,7 @@ class Fitness : public Findings {
     Names wrong;
     for (const auto& [name, run] : data_.raw) {
       const auto ledger = ledger_of(file_, run.id);
-      if (ledger && ledger->board_rate_hz &&
-          std::abs(*ledger->board_rate_hz / data_.info.daq.sample_rate_hz - 1) > kRateAgrees) {
+      if (ledger && is_another_rate(ledger->board_rate_hz, data_.info.daq.sample_rate_hz)) {
         wrong.add(fmt::format("{} ({:.2f} Hz)", name, *ledger->board_rate_hz));
       }
     }

@@ -141,8 +141,8 @@ ModelTerms terms_from_names(std::string_view names) {
     else if (name == "rotor_speed")
       terms.rotor_speed = true;
     else if (name != "thesis")
-      throw InputError(
-          fmt::format("'{}' is no term; write air_pressure, air_humidity, rotor_speed or thesis", name));
+      throw InputError(fmt::format(
+          "--with: '{}' is no term; write air_pressure, air_humidity, rotor_speed or thesis", name));
     names = end == std::string_view::npos ? std::string_view() : names.substr(end + 1);
   }
   return terms;

@@ -54,6 +54,18 @@ std::string now_utc() {
   return format_utc(static_cast<double>(std::chrono::duration_cast<std::chrono::seconds>(now).count()));
 }
 
+namespace {
+
+/// https://no-color.org
+bool colours_wanted() {
+  const char* without = std::getenv("NO_COLOR");  // NOLINT(concurrency-mt-unsafe): nobody sets it meanwhile
+  return without == nullptr || *without == '\0';
+}
+
+}  // namespace
+
+bool error_is_coloured() { return error_is_terminal() && colours_wanted(); }
+bool output_is_coloured() { return ::isatty(STDOUT_FILENO) != 0 && colours_wanted(); }
 bool error_is_terminal() { return ::isatty(STDERR_FILENO) != 0; }
 bool input_is_terminal() { return ::isatty(STDIN_FILENO) != 0; }
 
@@ -63,7 +75,7 @@ void tell(const std::string& text) {
 }
 
 void warn(const std::string& text) {
-  const bool colour = error_is_terminal();
+  const bool colour = error_is_coloured();
   tell(fmt::format("{}warning:{} {}\n", colour ? "\x1b[33m" : "", colour ? "\x1b[0m" : "", text));
 }
 

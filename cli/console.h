@@ -21,6 +21,12 @@ const std::string& arguments();
 std::string now_utc();
 
 bool error_is_terminal();
+
+/// Whether what is said on standard error, or output, is to be coloured: on a terminal, unless NO_COLOR is
+/// set.
+bool error_is_coloured();
+bool output_is_coloured();
+
 bool input_is_terminal();
 
 /// On standard error, where that can be written: a log on a full disk or a terminal that is gone must not end

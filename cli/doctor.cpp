@@ -41,7 +41,7 @@ std::vector<Finding> look_at(const CampaignFile& file) {
 }
 
 void print(const std::vector<Finding>& findings) {
-  const bool colour = ::isatty(STDOUT_FILENO) != 0;
+  const bool colour = output_is_coloured();
   for (const Finding& finding : findings) {
     const auto severity = static_cast<std::size_t>(finding.severity);
     fmt::print("{}{:<8}{} {:<12} {}\n", colour ? kColours[severity] : "", kNames[severity],

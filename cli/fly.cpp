@@ -1,5 +1,6 @@
 // tunnelrig fly: controllers through the thesis's scenarios in the simulated tunnel.
 #include "cli/console.h"
+#include "cli/fly_folder.h"
 #include "cli/fly_output.h"
 #include "cli/verb.h"
 #include "datasets/csv.h"
@@ -11,6 +12,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -25,7 +27,6 @@ struct FlyOptions {
   std::uint64_t seed = 1;
   double lidar_sigma_mm = 10;
   HiddenTruth hidden;
-  bool weak_rotor_named = false;
 };
 
 struct NamedMap {
@@ -100,9 +101,9 @@ std::vector<FlightLog> identification_flights(FlightTask task, const std::string
   return flights;
 }
 
-/// Flies one scenario; `gains` and `map` are shared by all.
+/// Flies one scenario; `gains` and `map` are shared by all. `out`: null where nothing is kept.
 FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, const NamedMap& map,
-                           const GainTable& gains, const Processes& processes) {
+                           const GainTable& gains, const Processes& processes, FlightsFolder* out) {
   const Airframe frame;
   const FlightSpace space(tunnel_from(one.tunnel), frame);
   const Scenario scenario = scenario_from(one.scenario, space, frame);
@@ -118,10 +119,10 @@ FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, c
     task.localisation->lidar.range_sigma_m = 1e-3 * options.lidar_sigma_mm;
     if (options.position == "lidar-thesis") task.localisation->filter = FlightFilter::thesis;
   }
-  const std::string extrapolated = extrapolation(map.map.geometry, space, frame);
-  if (!extrapolated.empty()) warn("extrapolated, in normalised coordinates: " + extrapolated);
-
-  FlownScenario flown{.tunnel = space.tunnel.name, .scenario = scenario.name};
+  FlownScenario flown{.tunnel = space.tunnel.name,
+                      .scenario = scenario.name,
+                      .extrapolated = extrapolation(map.map.geometry, space, frame)};
+  if (!flown.extrapolated.empty()) warn("extrapolated, in normalised coordinates: " + flown.extrapolated);
   const std::vector<std::string> names = controllers_of(options);
   ProgressBar progress("flying");
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -129,15 +130,14 @@ FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, c
       progress.show(static_cast<double>(i) * options.runs + done,
                     static_cast<double>(names.size()) * options.runs, names[i]);
     }));
-    if (options.out.empty()) continue;
+    if (out == nullptr) continue;
     flown.logs.push_back(fly_logged(task, names[i], gains));
     flown.identification.push_back(identification_flights(task, names[i], gains));
   }
-  if (!options.out.empty()) {
-    const bool all = options.scenario == "all";
-    const auto folder = std::filesystem::path(options.out) / (all ? flown.tunnel + "-" + flown.scenario : "");
+  if (out != nullptr) {
     std::string warning;
-    write_flown(folder, flown, task, warning);
+    out->add(options.scenario == "all" ? scenario_folder(flown.tunnel, flown.scenario) : "", flown, task,
+             warning);
     if (!warning.empty()) warn(warning);
     flown.for_report = flight_for_report(flown, task, map.name);
     flown.logs.clear();
@@ -166,6 +166,23 @@ void check_none_lost(const FlyOptions& options) {
       throw InputError(
           fmt::format("{}: has gains of {}, which are not tuned now and would be lost; write to another file",
                       options.tune, name));
+}
+
+/// What would be left out in silence.
+void refuse_unused(const FlyOptions& options, const CLI::App& verb) {
+  if (!options.tune.empty())
+    refuse_given(verb,
+                 {"--json", "--out", "--gains", "--scenario", "--tunnel", "--runs", "--seed", "--position",
+                  "--lidar-sigma-mm", "--payload-kg", "--map-scale", "--wind-m-s", "--gust-m-s",
+                  "--motor-loss", "--weak-rotor"},
+                 "does not go with --tune, which flies the same flights whatever is said of them, and writes "
+                 "gains alone; fly with --gains afterwards");
+  else
+    refuse_given(verb, {"--budget"}, "is of tuning; it goes with --tune");
+  if (options.position == "given")
+    refuse_given(verb, {"--lidar-sigma-mm"}, "with --position given there is no LIDAR");
+  if (verb.count("--motor-loss") == 0)
+    refuse_given(verb, {"--weak-rotor"}, "says which rotor lost thrust; --motor-loss says how much");
 }
 
 int tune_all(const FlyOptions& options) {
@@ -198,16 +215,17 @@ FlyOptions quiet_options(FlyOptions options) {
   return options;
 }
 
-int run_fly(const FlyOptions& given) {
+int run_fly(const FlyOptions& given, const CLI::App& verb) {
   const Processes processes;
   const FlyOptions options = processes.rank() > 0 ? quiet_options(given) : given;
   options.hidden.validate();
-  if (options.hidden.motor_loss > 0 && !options.weak_rotor_named)
+  if (options.hidden.motor_loss > 0 && verb.count("--weak-rotor") == 0)
     warn(fmt::format("--motor-loss without --weak-rotor: it is rotor {} that lost thrust",
                      options.hidden.weak_rotor));
   if (options.position != "lidar" && options.position != "lidar-thesis" && options.position != "given")
     throw InputError(fmt::format("--position {}: must be lidar, lidar-thesis or given", options.position));
   check_places(options);
+  refuse_unused(options, verb);
   if (!options.tune.empty()) return tune_all(options);
   const NamedMap map = map_of(options);
   const GainTable gains =
@@ -215,21 +233,21 @@ int run_fly(const FlyOptions& given) {
   const bool programme = options.scenario == "all";
   const std::vector<PlaceAndPath> wanted = programme_of(options);
   check_all(options, wanted, gains);
-  const FoldersForOutput made(options.out);
-  if (!options.out.empty()) make_folder(options.out);
+  std::optional<FlightsFolder> out;
+  if (!options.out.empty()) out.emplace(options.out);
   std::vector<FlownScenario> flown;
   fmt::print("SIMULATED flights; map: {}\n\n", map.name);
   for (const PlaceAndPath& one : wanted) {
-    flown.push_back(fly_scenario(options, one, map, gains, processes));
+    flown.push_back(fly_scenario(options, one, map, gains, processes, out ? &*out : nullptr));
     print_flown(flown.back());
   }
   if (programme) print_beside_thesis(flown);
-  if (!options.out.empty()) {
+  if (!options.json.empty()) write_text(options.json, flown_json(flown, map.name, options.seed, programme));
+  if (out) {
     std::vector<std::string> shown;
     for (const FlownScenario& one : flown) shown.push_back(one.for_report);
-    write_text(std::filesystem::path(options.out) / "flights.json", flights_json(shown, arguments()));
+    out->publish(flights_json(shown, arguments()));
   }
-  if (!options.json.empty()) write_text(options.json, flown_json(flown, map.name, options.seed, programme));
   return kWell;
 }
 
@@ -285,13 +303,10 @@ void add_fly(CLI::App& app, Work& work) {
                    "Undeclared: gusts along the tunnel, standard deviation");
   verb->add_option("--motor-loss", options->hidden.motor_loss,
                    "Undeclared: share of its thrust that a rotor lost");
-  const CLI::Option* weak = verb->add_option("--weak-rotor", options->hidden.weak_rotor,
-                                             "Which rotor that is, 1 to 4, numbered as the rig's")
-                                ->capture_default_str();
-  verb->callback([options, weak, &work] {
-    options->weak_rotor_named = weak->count() > 0;
-    work = [options] { return run_fly(*options); };
-  });
+  verb->add_option("--weak-rotor", options->hidden.weak_rotor,
+                   "Which rotor that is, 1 to 4, numbered as the rig's")
+      ->capture_default_str();
+  verb->callback([options, verb, &work] { work = [options, verb] { return run_fly(*options, *verb); }; });
 }
 
 }  // namespace tunnelrig::cli

@@ -68,7 +68,9 @@ nlohmann::ordered_json scenario_json(const FlownScenario& flown, const std::stri
                               {"scenario", flown.scenario},
                               {"map", map},
                               {"seed", seed},
+                              {"extrapolated", nullptr},
                               {"controllers", nlohmann::ordered_json::array()}};
+  if (!flown.extrapolated.empty()) json["extrapolated"] = flown.extrapolated;
   for (const Comparison& c : flown.controllers) json["controllers"].push_back(controller_json(c));
   return json;
 }
@@ -128,6 +130,10 @@ std::string position_of(const FlightTask& task) {
 
 }  // namespace
 
+std::string scenario_folder(const std::string& tunnel, const std::string& scenario) {
+  return tunnel + "-" + scenario;
+}
+
 std::string flight_for_report(const FlownScenario& flown, const FlightTask& task, const std::string& map) {
   nlohmann::ordered_json json = scenario_json(flown, map, task.seed);
   json["position"] = position_of(task);
@@ -148,15 +154,16 @@ std::string flight_for_report(const FlownScenario& flown, const FlightTask& task
 }
 
 std::string flights_json(const std::vector<std::string>& flights, const std::string& command) {
-  nlohmann::ordered_json json{{"format", "tunnelrig-flights/1"}, {"command", command}, {"flights", {}}};
+  nlohmann::ordered_json json{{"format", kFlightsFormat}, {"command", command}, {"flights", {}}};
   json["flights"] = nlohmann::ordered_json::array();
   for (const std::string& one : flights) json["flights"].push_back(nlohmann::ordered_json::parse(one));
   return json.dump() + "\n";
 }
 
 void print_flown(const FlownScenario& flown) {
-  fmt::print("{} in the {} tunnel, {} runs\n", flown.scenario, flown.tunnel,
-             flown.controllers.empty() ? 0 : flown.controllers[0].runs.size());
+  fmt::print("{} in the {} tunnel, {} runs{}\n", flown.scenario, flown.tunnel,
+             flown.controllers.empty() ? 0 : flown.controllers[0].runs.size(),
+             flown.extrapolated.empty() ? "" : ", extrapolated");
   Table table({"controller", "rms y [mm]", "rms z [mm]", "max y [mm]", "max z [mm]", "p95 y [mm]",
                "p95 z [mm]", "mean rms, 95 % [mm]", "effort [N]", "saturated [s]", "estimator [mm]", "NEES/4",
                "contacts"});
@@ -227,7 +234,7 @@ std::vector<std::filesystem::path> write_flown(const std::filesystem::path& fold
     write(name + ".csv", format_log(flown.logs[i]));
     write(name + "-residual.csv", format_residuals(flown.identification[i], task.believed));
   }
-  for (const char* response : {"vertical", "lateral", "roll", "pitch"}) {
+  for (const char* response : kResiduals) {
     write(fmt::format("residual-{}.toml", response), residual_schema(response));
     write(fmt::format("effects-{}.toml", response), residual_effects(response, task.believed));
   }

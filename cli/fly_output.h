@@ -3,15 +3,26 @@
 
 #include "flight/simulation/monte_carlo.h"
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 namespace tunnelrig::cli {
 
+inline constexpr const char* kFlightsFormat = "tunnelrig-flights/1";
+
+/// What write_flown calls its files by.
+inline constexpr std::array<const char*, 4> kResiduals = {"vertical", "lateral", "roll", "pitch"};
+inline constexpr std::array<const char*, 3> kPictures = {"path", "error-y", "error-z"};
+
+/// Of a scenario that is one of several.
+std::string scenario_folder(const std::string& tunnel, const std::string& scenario);
+
 /// One scenario in one tunnel, flown by several controllers.
 struct FlownScenario {
   std::string tunnel, scenario;
+  std::string extrapolated;  // what differs from the map's tunnel and vehicle; empty: nothing
   std::vector<Comparison> controllers;
   std::vector<FlightLog> logs;                         // the first run of each controller; may be empty
   std::string for_report;                              // flight_for_report

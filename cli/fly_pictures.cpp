@@ -86,7 +86,8 @@ std::vector<std::filesystem::path> draw_flown(const std::filesystem::path& folde
   const std::string title =
       "set title " +
       gnuplot_text(
-          fmt::format("{}, {} tunnel, first run (simulated){}", flown.scenario, flown.tunnel,
+          fmt::format("{}, {} tunnel, first run (simulated{}){}", flown.scenario, flown.tunnel,
+                      flown.extrapolated.empty() ? "" : ", extrapolated",
                       shown < flown.logs.size() ? fmt::format("; the first {} controllers", shown) : "")) +
       " noenhanced\n";
   const auto add = [&](const char* name, const std::string& plot, int width, int height) {
@@ -100,9 +101,9 @@ std::vector<std::filesystem::path> draw_flown(const std::filesystem::path& folde
     }
   };
   script = "set encoding utf8\nset grid lc rgb '#dddddd'\n" + script;
-  add("path", path_plot(flown, task, shown), 1000, 820);
-  add("error-y", error_plot(flown, shown, "y", 4), 1100, 520);
-  add("error-z", error_plot(flown, shown, "z", 5), 1100, 520);
+  add(kPictures[0], path_plot(flown, task, shown), 1000, 820);
+  add(kPictures[1], error_plot(flown, shown, "y", 4), 1100, 520);
+  add(kPictures[2], error_plot(flown, shown, "z", 5), 1100, 520);
   const Staging staging(folder, "pictures");
   std::optional<std::string> failed;
   staging.write([&] { failed = run_gnuplot("gnuplot", staging.path(), script); });

@@ -133,7 +133,20 @@ std::size_t versions_in(const std::string& db) {
   }
 }
 
-int run_import(const ImportVerbOptions& options) {
+/// Options that say how another kind of source is to be read.
+void refuse_of_other_formats(const ImportVerbOptions& options, const CLI::App& verb) {
+  const std::string why = fmt::format("is not for --format {}; ", options.format);
+  if (options.format != "folder")
+    refuse_given(verb, {"--allow-stuck"}, why + "a campaign folder alone has channels");
+  if (options.format != "rcbenchmark")
+    refuse_given(verb, {"--sweeps", "--propeller-diameter-m", "--pole-count"},
+                 why + "it is of sweeps (--format rcbenchmark)");
+  if (options.format == "folder")
+    refuse_given(verb, {"--schema"}, why + "the folder's files say what their columns are");
+}
+
+int run_import(const ImportVerbOptions& options, const CLI::App& verb) {
+  refuse_of_other_formats(options, verb);
   const std::size_t lost = options.replace ? versions_in(options.db) : 0;
   const int code = options.format == "folder" ? import_folder(options) : import_rows(options);
   if (lost > 0)
@@ -171,7 +184,7 @@ void add_import(CLI::App& app, Work& work) {
   verb->add_option("--pole-count", options->pole_count,
                    "Of the motor, where the speed column counts electrical revolutions");
   verb->add_flag("--json", options->json, "Print the summary as JSON");
-  verb->callback([options, &work] { work = [options] { return run_import(*options); }; });
+  verb->callback([options, verb, &work] { work = [options, verb] { return run_import(*options, *verb); }; });
 }
 
 }  // namespace tunnelrig::cli

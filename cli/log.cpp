@@ -79,7 +79,9 @@ int run_one(const LogOptions& options) {
   return logging.record(asked, "");
 }
 
-int run_log(const LogOptions& options) {
+int run_log(const LogOptions& options, const CLI::App& verb) {
+  if (options.source != "virtual")
+    refuse_given(verb, {"--speed", "--seed", "--faults"}, "is for the virtual rig, not for another --source");
   if (!(options.duration_s > 0 && options.duration_s <= kLongestRun_s))
     throw InputError(
         fmt::format("--duration {:g}: seconds, above 0, at most {:g}", options.duration_s, kLongestRun_s));
@@ -158,7 +160,7 @@ void add_log(CLI::App& app, Work& work) {
       "--faults", options->faults,
       "Virtual rig: "
       "drop=0.001,duplicate=…,reorder=…,corrupt=…,truncate=…,garbage=…,stall=AT:FOR,reboot=AT:FOR");
-  verb->callback([options, &work] { work = [options] { return run_log(*options); }; });
+  verb->callback([options, verb, &work] { work = [options, verb] { return run_log(*options, *verb); }; });
 }
 
 }  // namespace tunnelrig::cli

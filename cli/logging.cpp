@@ -8,6 +8,7 @@
 #include "datasets/error.h"
 #include "datasets/locations.h"
 #include "datasets/open_space.h"
+#include "datasets/recorded_rate.h"
 #include "datasets/run_marks.h"
 
 #include <algorithm>
@@ -64,6 +65,24 @@ bool warn_of_unusable(const std::string& run, const Ledger& ledger) {
                     "restarts needs a new boot id",
                     run, ledger.frames_duplicate));
   return ledger.packets_corrupt > 0;
+}
+
+/// Says where the board's rate is not the campaign's. True where it is a problem.
+bool warn_of_rate(const std::string& run, const Ledger& ledger, double campaign_rate_hz) {
+  if (ledger.frames_stored > 0 && !ledger.board_rate_hz) {
+    warn(fmt::format(
+        "run {}: the board says no rate (0 ticks a second, or a frame); {:.3f} Hz, campaign.toml's, "
+        "is taken for it",
+        run, campaign_rate_hz));
+    return true;
+  }
+  if (!is_another_rate(ledger.board_rate_hz, campaign_rate_hz)) return false;
+  warn(fmt::format(
+      "run {}: the board samples at {:.3f} Hz, campaign.toml says {:.3f} Hz; by the board the run is "
+      "{:.3f} s long, but its spectrum and times go by campaign.toml",
+      run, *ledger.board_rate_hz, campaign_rate_hz,
+      static_cast<double>(ledger.frames_emitted) / *ledger.board_rate_hz));
+  return true;
 }
 
 /// What was received once does not come again: it is never written over, not even by the rest of its plan.
@@ -316,11 +335,7 @@ int Logging::report(const std::string& name, const PlannedRun& planned, const Lo
     warn(fmt::format("run {}: the board flags {} frames as {}", name, frames, what));
     problem = true;
   }
-  if (ledger.board_rate_hz && std::abs(*ledger.board_rate_hz / info_.daq.sample_rate_hz - 1) > 1e-3) {
-    warn(fmt::format("run {}: the board samples at {:.3f} Hz, campaign.toml says {:.3f} Hz", name,
-                     *ledger.board_rate_hz, info_.daq.sample_rate_hz));
-    problem = true;
-  }
+  problem |= warn_of_rate(name, ledger, info_.daq.sample_rate_hz);
   for (std::size_t c = 0;
        c < outcome.statistics.channels.size() && c < static_cast<std::size_t>(info_.rig.rotors); ++c) {
     const ChannelStatistics& channel = outcome.statistics.channels[c];

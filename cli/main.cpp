@@ -13,6 +13,7 @@
 #include <iostream>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -22,7 +23,7 @@ namespace tunnelrig::cli {
 namespace {
 
 int report(const std::string& text, int code) {
-  const bool colour = error_is_terminal();
+  const bool colour = error_is_coloured();
   tell(fmt::format("{}tunnelrig:{} {}\n", colour ? "\x1b[31m" : "", colour ? "\x1b[0m" : "", text));
   return code;
 }
@@ -38,14 +39,19 @@ bool could_print() {
   return std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.flush().good();
 }
 
-/// What a text would be a number of, and is none: CLI11 reads it, and every range lets it pass.
-void refuse_nan(const CLI::App& app) {
-  for (const CLI::Option* option : app.get_options())
-    if (option->get_type_name().starts_with("FLOAT"))
-      for (const std::string& text : option->results())
-        if (std::isnan(std::strtod(text.c_str(), nullptr)))
-          throw InputError(fmt::format("{} {}: a number is required", option->get_name(), text));
-  for (const CLI::App* verb : app.get_subcommands()) refuse_nan(*verb);
+/// What CLI11 reads and no range keeps out: what would be a number and is none, and what is below 0 where it
+/// would be taken for a very large number.
+void refuse_misread_numbers(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    const std::string type = option->get_type_name();
+    for (const std::string& text : option->results()) {
+      if (type.starts_with("FLOAT") && std::isnan(std::strtod(text.c_str(), nullptr)))
+        throw InputError(fmt::format("{} {}: a number is required", option->get_name(), text));
+      if (type.starts_with("UINT") && text.starts_with('-'))
+        throw InputError(fmt::format("{} {}: must not be below 0", option->get_name(), text));
+    }
+  }
+  for (const CLI::App* verb : app.get_subcommands()) refuse_misread_numbers(*verb);
 }
 
 int run(int argc, char** argv) {
@@ -54,13 +60,20 @@ int run(int argc, char** argv) {
   declare_program(app, work);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::RequiredError& error) {
+    // CLI11 says that a verb is missing, and not which word is none.
+    const std::vector<std::string> words = app.remaining();
+    if (app.get_subcommands().empty() && !words.empty())
+      throw InputError(fmt::format("{}: there is no such verb; tunnelrig --help lists them", words.front()));
+    app.exit(error);
+    return kBadInput;
   } catch (const CLI::ParseError& error) {
     const bool asked_for_help = error.get_exit_code() == 0;
     app.exit(error);
     if (!asked_for_help) return kBadInput;
     return could_print() ? kWell : cannot_print();
   }
-  refuse_nan(app);
+  refuse_misread_numbers(app);
   const int code = work();
   return could_print() ? code : cannot_print();
 }

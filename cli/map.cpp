@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <memory>
 
 #include <fmt/format.h>
@@ -33,6 +34,21 @@ nlohmann::ordered_json fit_json(const FitSummary& fit) {
   return json;
 }
 
+/// So that the greatest of them has two digits that count; `least` at least.
+int decimals_for(std::initializer_list<double> values, int least) {
+  constexpr int kMostDecimals = 6;
+  double greatest = 0;
+  for (const double value : values) greatest = std::max(greatest, std::abs(value));
+  if (!(greatest > 0) || !std::isfinite(greatest)) return least;
+  return std::clamp(1 - static_cast<int>(std::floor(std::log10(greatest))), least, kMostDecimals);
+}
+
+/// Without the sign of what is rounded to 0.
+std::string rounded_text(double value, int decimals) {
+  const double unit = std::pow(10, decimals);
+  return fmt::format("{:.{}f}", std::round(value * unit) / unit + 0.0, decimals);
+}
+
 void print(const WrittenMaps& written) {
   Table table(
       {"map", "lowest [%]", "highest [%]", "median U95 [%]", "leave-one-out rms [%]", "standardised"});
@@ -41,9 +57,10 @@ void print(const WrittenMaps& written) {
     std::nth_element(u95.begin(), u95.begin() + static_cast<std::ptrdiff_t>(u95.size() / 2), u95.end());
     const auto [low, high] = std::minmax_element(layer.value_percent.begin(), layer.value_percent.end());
     const auto& standardised = fit.leave_one_out.standardised_rms;
-    table.add({name, fmt::format("{:.2f}", *low), fmt::format("{:.2f}", *high),
-               fmt::format("{:.3f}", u95[u95.size() / 2]),
-               fmt::format("{:.3f}", fit.leave_one_out.rms_percent),
+    const double median = u95[u95.size() / 2], left_out = fit.leave_one_out.rms_percent;
+    const int decimals = decimals_for({*low, *high}, 2), of_errors = decimals_for({median, left_out}, 3);
+    table.add({name, rounded_text(*low, decimals), rounded_text(*high, decimals),
+               rounded_text(median, of_errors), rounded_text(left_out, of_errors),
                standardised ? fmt::format("{:.2f}", *standardised) : "-"});
   };
   row("change of C_T against OT", written.map.delta_ct, written.map.delta_ct_fit);
@@ -63,6 +80,7 @@ void check_nodes(int nodes) {
 
 int run_map(const MapOptions& options) {
   check_nodes(options.nodes);
+  const MapMethod method = naming("--method", [&] { return map_method(options.method); });
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   const CampaignData data = read_campaign_data(file);
   const Reduction reduction = reduce_by(data, choose_model(file, options.model, options.terms));
@@ -72,8 +90,7 @@ int run_map(const MapOptions& options) {
     warn(fmt::format(
         "not on the map: {}; neither a label of the tunnel's grid nor y_norm and z_norm say where",
         first_few(not_on_map, kNamedLocations)));
-  const TunnelMaps maps =
-      fit_maps(map_input(data, summary, options.db), {.method = map_method(options.method)});
+  const TunnelMaps maps = fit_maps(map_input(data, summary, options.db), {.method = method});
   const nlohmann::json provenance{{"program", "tunnelrig " + program_version()},
                                   {"arguments", arguments()},
                                   {"campaign", data.info.name},

@@ -142,14 +142,10 @@ bool warn_of_left_out(const CampaignData& data, const Reduction& reduction) {
   return problem;
 }
 
-/// What was asked for and would not be done.
-void refuse(bool asked, const char* option, const char* why) {
-  if (asked) throw InputError(fmt::format("{}: {}", option, why));
-}
-
-int reduce_campaign(const ReduceOptions& options, const CampaignFile& file) {
-  refuse(!options.plot.empty(), "--plot",
-         "draws a table of observations; `map` and `report --figures` draw a campaign");
+int reduce_campaign(const ReduceOptions& options, const CLI::App& verb, const CampaignFile& file) {
+  refuse_given(verb, {"--plot"},
+               "draws a table of observations; `map` and `report --figures` draw a campaign");
+  if (!options.from_raw) refuse_given(verb, {"--no-spectra"}, "goes with --from-raw, which computes them");
   CampaignData data = read_campaign_data(file);
   const bool agreed = !options.from_raw || refresh_from_raw(options, data);
   const Convention convention =
@@ -211,12 +207,12 @@ bool warn_of_table(const TableReduction& reduction) {
   return reduction.unknown > 0 || implausible;
 }
 
-int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
+int reduce_table(const ReduceOptions& options, const CLI::App& verb, const CampaignFile& file) {
   if (!options.model.empty() && options.model != "thesis")
     throw InputError(fmt::format("--model {}: a table is reduced as it is, without a model", options.model));
-  refuse(!options.terms.empty(), "--with", "a table is reduced as it is, without a model");
-  refuse(!options.runs_csv.empty(), "--runs-csv", "a table has no runs; --csv writes a row per observation");
-  refuse(options.from_raw, "--from-raw", "a table has no raw data");
+  refuse_given(verb, {"--with"}, "a table is reduced as it is, without a model");
+  refuse_given(verb, {"--runs-csv"}, "a table has no runs; --csv writes a row per observation");
+  refuse_given(verb, {"--from-raw", "--no-spectra"}, "a table has no raw data");
   const Convention convention =
       convention_from_name(options.convention.empty() ? "propeller" : options.convention);
   const TableReduction reduction = reduce_table_rows(observations_of(file), convention);
@@ -232,10 +228,10 @@ int reduce_table(const ReduceOptions& options, const CampaignFile& file) {
   return warn_of_table(reduction) ? kProblemFound : kWell;
 }
 
-int run_reduce(const ReduceOptions& options) {
+int run_reduce(const ReduceOptions& options, const CLI::App& verb) {
   check_distinct({{"--csv", options.csv}, {"--runs-csv", options.runs_csv}, {"--plot", options.plot}});
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
-  return file.text("table.toml") ? reduce_table(options, file) : reduce_campaign(options, file);
+  return file.text("table.toml") ? reduce_table(options, verb, file) : reduce_campaign(options, verb, file);
 }
 
 }  // namespace
@@ -260,7 +256,7 @@ void add_reduce(CLI::App& app, Work& work) {
                  "Compute the runs' statistics again from their raw data, and compare");
   verb->add_flag("--no-spectra", options->no_spectra, "With --from-raw: leave the spectra out");
   verb->add_flag("--json", options->json, "Print as JSON");
-  verb->callback([options, &work] { work = [options] { return run_reduce(*options); }; });
+  verb->callback([options, verb, &work] { work = [options, verb] { return run_reduce(*options, *verb); }; });
 }
 
 }  // namespace tunnelrig::cli

@@ -44,9 +44,11 @@ void write_all_figures(const ReportOptions& options, const CampaignFile& file,
              options.figures);
 }
 
-int run_report(const ReportOptions& options) {
+int run_report(const ReportOptions& options, const CLI::App& verb) {
   if (options.out.empty() && options.figures.empty())
     throw InputError("report: --out FILE (the page), --figures FOLDER, or both are required");
+  if (options.figures.empty())
+    refuse_given(verb, {"--format", "--width-mm"}, "says how figures are drawn; it goes with --figures");
   const CampaignFile file(options.db, CampaignFile::Access::kRead);
   const ReportSettings settings{.db = options.db,
                                 .program_version = program_version(),
@@ -85,7 +87,7 @@ void add_report(CLI::App& app, Work& work) {
   verb->add_option("--flights", options->flights,
                    "flights.json of `tunnelrig fly --out`, for a section of its own");
   add_model_options(*verb, options->model, options->terms);
-  verb->callback([options, &work] { work = [options] { return run_report(*options); }; });
+  verb->callback([options, verb, &work] { work = [options, verb] { return run_report(*options, *verb); }; });
 }
 
 }  // namespace tunnelrig::cli

@@ -1,6 +1,10 @@
 #include "cli/verbs.h"
 
 #include "cli/console.h"
+#include "cli/verb.h"
+#include "datasets/error.h"
+
+#include <fmt/format.h>
 
 namespace tunnelrig::cli {
 
@@ -20,6 +24,11 @@ void declare_program(CLI::App& app, Work& work) {
         add_serve, add_devices, add_doctor, add_explain, add_models, add_fly}) {
     add(app, work);
   }
+}
+
+void refuse_given(const CLI::App& verb, std::initializer_list<const char*> options, std::string_view why) {
+  for (const char* option : options)
+    if (verb.count(option) > 0) throw InputError(fmt::format("{}: {}", option, why));
 }
 
 }  // namespace tunnelrig::cli

@@ -38,9 +38,10 @@ void parse_item(std::string_view item, Faults& faults) {
         "--faults: '{}' is none of drop duplicate reorder corrupt truncate garbage stall reboot", name));
   }
   const auto colon = value.find(':');
+  if (colon == std::string_view::npos)
+    throw InputError(fmt::format("--faults: '{}': when and for how long, in seconds: {}=2:1.5", item, name));
   const double at_s = require_number(value.substr(0, colon), item, 1e6);
-  const double for_s =
-      colon == std::string_view::npos ? 1 : require_number(value.substr(colon + 1), item, 1e6);
+  const double for_s = require_number(value.substr(colon + 1), item, 1e6);
   (name == "stall" ? faults.stall_at_s : faults.reboot_at_s) = at_s;
   (name == "stall" ? faults.stall_s : faults.reboot_s) = for_s;
 }

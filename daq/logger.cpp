@@ -200,13 +200,11 @@ class Recording {
   Recording(CampaignFile& file, const std::string& run, const CampaignInfo& info, const LogSettings& settings,
             RunSummarizer& summarizer, const PacketSource& source)
       : settings_(settings),
-        rate_hz_(info.daq.sample_rate_hz),
-        // A tracker of no frames would never be complete.
-        tracker_(static_cast<std::uint64_t>(std::max(1LL, std::llround(settings.duration_s * rate_hz_)))),
+        tracker_(settings.duration_s, info.daq.sample_rate_hz),
         file_(file),
-        writer_(file, run, RawFormat{}, static_cast<std::size_t>(kChunk_s * rate_hz_)),
+        writer_(file, run, RawFormat{}, static_cast<std::size_t>(kChunk_s * info.daq.sample_rate_hz)),
         sink_(writer_, summarizer, settings.watcher),
-        packets_(tracker_, sink_, rate_hz_),
+        packets_(tracker_, sink_, info.daq.sample_rate_hz),
         watchdog_(settings.silence_s, settings.give_up_s),
         source_(source) {}
 
@@ -261,7 +259,7 @@ class Recording {
   void report(const std::function<void(const LogProgress&)>& progress) const {
     if (!progress) return;
     const Ledger now = ledger();
-    progress({.elapsed_s = static_cast<double>(now.frames_emitted) / rate_hz_,
+    progress({.elapsed_s = static_cast<double>(now.frames_emitted) / tracker_.rate_hz(),
               .duration_s = settings_.duration_s,
               .silent = watchdog_.silent(),
               .instead = watchdog_.silent() ? unusable_between(at_last_frame_, now) : "",
@@ -329,7 +327,6 @@ class Recording {
   }
 
   const LogSettings& settings_;
-  double rate_hz_;
   PacketDecoder decoder_;
   LossTracker tracker_;
   CampaignFile& file_;

@@ -1,5 +1,7 @@
 #include "daq/loss_ledger.h"
 
+#include "datasets/recorded_rate.h"
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -39,7 +41,17 @@ double rate_of(const trw_header& header) {
   return header.ticks_per_frame == 0 ? 0.0 : static_cast<double>(header.tick_hz) / header.ticks_per_frame;
 }
 
+/// A run of no frames would never be complete.
+std::uint64_t frames_in(double duration_s, double rate_hz) {
+  return static_cast<std::uint64_t>(std::max(1LL, std::llround(duration_s * rate_hz)));
+}
+
 }  // namespace
+
+LossTracker::LossTracker(double duration_s, double expected_rate_hz)
+    : frames_wanted_(frames_in(duration_s, expected_rate_hz)),
+      wanted_s_(duration_s),
+      rate_hz_(expected_rate_hz) {}
 
 void LossTracker::start(const trw_header& header) {
   started_ = true;
@@ -49,6 +61,10 @@ void LossTracker::start(const trw_header& header) {
   ledger_.first_sequence = header.first_sequence;
   first_rate_hz_ = rate_of(header);
   if (first_rate_hz_ > 0) ledger_.board_rate_hz = first_rate_hz_;
+  if (wanted_s_ > 0 && is_another_rate(ledger_.board_rate_hz, rate_hz_)) {
+    rate_hz_ = first_rate_hz_;
+    frames_wanted_ = frames_in(wanted_s_, rate_hz_);
+  }
 }
 
 void LossTracker::lose(std::uint64_t frames, const char* cause, bool estimated, FrameSink& sink) {

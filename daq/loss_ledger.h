@@ -25,6 +25,13 @@ class LossTracker {
   /// The run ends when `frames_wanted` frames are accounted for (stored or lost); 0: never.
   explicit LossTracker(std::uint64_t frames_wanted) : frames_wanted_(frames_wanted) {}
 
+  /// The run ends when `duration_s` of frames are accounted for: by `expected_rate_hz`, or, where the board
+  /// says another by more than 0.1 %, by that.
+  LossTracker(double duration_s, double expected_rate_hz);
+
+  /// By which the run's frames are seconds.
+  double rate_hz() const { return rate_hz_; }
+
   /// Takes a packet that was received at `time_s`; passes its frames (int16 × 4) and the gap before them to
   /// `sink`.
   void take(const Packet& packet, double time_s, FrameSink& sink);
@@ -54,6 +61,7 @@ class LossTracker {
   void forget_oldest();
 
   std::uint64_t frames_wanted_;
+  double wanted_s_ = 0, rate_hz_ = 0;
   double first_rate_hz_ = 0;
   std::optional<double> changed_rate_hz_;
   Ledger ledger_;

@@ -2,6 +2,7 @@
 #include "analysis/exports/table_builder.h"
 #include "analysis/exports/tables.h"
 #include "datasets/lower_case.h"
+#include "datasets/recorded_rate.h"
 
 #include <algorithm>
 #include <set>
@@ -177,7 +178,8 @@ Table recordings_table(const CampaignFile& file, const std::vector<RawRun>& raw,
               [](const Recorded& one) { return one.raw.format.channels; })
       .column("frames", "1", "Frames that are stored", [](const Recorded& one) { return one.raw.frames; })
       .column("frames_lost", "1", "Frames that are missing between them", &Recorded::lost)
-      .column("sample_rate_hz", "Frames per second", [&](const Recorded&) { return daq.sample_rate_hz; })
+      .column("sample_rate_hz", "Frames per second",
+              [&](const Recorded& one) { return recorded_rate_hz(one.ledger, daq.sample_rate_hz); })
       .column("board_rate_hz", "Frames per second as fitted against the computer's clock",
               ledger_number(&Ledger::board_rate_hz))
       .column("rate_interval_hz", "Half of that rate's 95 % interval",

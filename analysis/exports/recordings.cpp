@@ -1,6 +1,7 @@
 #include "analysis/exports/recordings.h"
 
 #include "analysis/exports/tables.h"
+#include "datasets/recorded_rate.h"
 
 #include <algorithm>
 #include <array>
@@ -195,12 +196,13 @@ std::vector<RecordingSource> recording_sources(const CampaignFile& file, const C
     RecordingSource source{.raw = raw, .description = {}, .thrust = {}};
     if (parts.thrusts && data.certificate && raw.format.channels >= data.info.rig.rotors)
       source.thrust = thrust_line(data, tares, raw, run);
-    source.description = {.key = keys.at(raw.run),
-                          .run = raw.run,
-                          .location = run != nullptr ? run->location : "",
-                          .sample_rate_hz = data.info.daq.sample_rate_hz,
-                          .frames = raw.frames,
-                          .series = series_of(raw, lost, parts, source.thrust)};
+    source.description = {
+        .key = keys.at(raw.run),
+        .run = raw.run,
+        .location = run != nullptr ? run->location : "",
+        .sample_rate_hz = recorded_rate_hz(ledger_of(file, raw.id), data.info.daq.sample_rate_hz),
+        .frames = raw.frames,
+        .series = series_of(raw, lost, parts, source.thrust)};
     sources.push_back(std::move(source));
   }
   return sources;

@@ -148,11 +148,19 @@ void check_origin(const Node& document, const MapGrid& grid, const MapLayer& del
   if (value != 0) document["delta_ct_percent"].fail("must be 0 at y_norm = z_norm = 0, is {}", value);
 }
 
-/// A rotor does not pull down: C_T is not negative, nor is either pair's share of the sum.
+/// A rotor does not pull down: C_T is not negative, nor is either pair's share of the sum. Nor does a wall
+/// make it ten times stronger.
 void check_thrusts(const Node& document, const DisturbanceMap& map) {
+  constexpr double kMost_percent = 1000;
   for (const double value : map.delta_ct.value_percent) {
     if (value < -100) document["delta_ct_percent"].fail("must not be below -100 %, holds {}", value);
+    if (value > kMost_percent)
+      document["delta_ct_percent"].fail("must not be above {} %, holds {}", kMost_percent, value);
   }
+  for (const auto& [key, layer] :
+       {std::pair("delta_ct_u95_percent", &map.delta_ct), {"uneven_thrust_u95_percent", &map.uneven_thrust}})
+    for (const double value : layer->u95_percent)
+      if (value > kMost_percent) document[key].fail("must not be above {} %, holds {}", kMost_percent, value);
   for (const double value : map.uneven_thrust.value_percent) {
     if (std::abs(value) > 100)
       document["uneven_thrust_percent"].fail("must be from -100 to 100 %, holds {}", value);

@@ -87,21 +87,39 @@ std::string labels(const std::vector<ContourLabel>& list, bool with_sign) {
   return out;
 }
 
+/// Of the colours: from −end, or from 0, to end.
+struct BarRange {
+  double step = 0, end = 0;
+  int decimals = 0;  // of its numbers
+};
+
+BarRange bar_range(const Picture& picture) {
+  constexpr int kMostDecimals = 12;
+  double greatest = 1e-6;
+  for (const double value : picture.values) greatest = std::max(greatest, std::abs(value));
+  BarRange bar{.step = nice_step(greatest / 5)};
+  bar.end = bar.step * std::ceil(greatest / bar.step);
+  for (double whole = bar.step;
+       std::abs(whole - std::round(whole)) > 1e-6 * whole && bar.decimals < kMostDecimals; whole *= 10)
+    ++bar.decimals;
+  return bar;
+}
+
 /// Colours and their range. Diverging: ColorBrewer's RdBu, white at 0; seen without the medium-wave cones
 /// (Machado et al. 2009) it runs from blue to brown with monotonic lightness on either side. Sequential: a
 /// straight line in CIELAB from white, in which equal steps look equal, with and without those cones.
 std::string colours(const Picture& picture) {
-  double greatest = 1e-6;
-  for (const double value : picture.values) greatest = std::max(greatest, std::abs(value));
-  const double step = nice_step(greatest / 5), end = step * std::ceil(greatest / step);
+  const BarRange bar = bar_range(picture);
   const char* palette =
       picture.diverging
           ? "0 '#2166ac', 1 '#4393c3', 2 '#92c5de', 3 '#d1e5f0', 4 '#f7f7f7', 5 '#fddbc7', 6 '#f4a582', "
             "7 '#d6604d', 8 '#b2182b'"
           : "0 '#f9f9f9', 1 '#eae6f1', 2 '#dad2ea', 3 '#cabfe2', 4 '#bbacda', 5 '#ab9ad2', 6 '#9b88ca', "
             "7 '#8a76c1', 8 '#7a64b9'";
-  return fmt::format("set palette defined ({})\nset cbrange [{:.6g}:{:.6g}]\nset cbtics {:.6g}\n", palette,
-                     picture.diverging ? -end : 0, end, step);
+  // Below a ten-thousandth gnuplot goes over to powers of ten, of which nobody knows how wide they are.
+  const std::string format = bar.step < 1e-4 ? fmt::format("set format cb '%.{}f'\n", bar.decimals) : "";
+  return fmt::format("set palette defined ({})\nset cbrange [{:.6g}:{:.6g}]\nset cbtics {:.6g}\n{}", palette,
+                     picture.diverging ? -bar.end : 0, bar.end, bar.step, format);
 }
 
 std::string margins(const PictureFrame& frame) {
@@ -163,7 +181,30 @@ Halves halves_of(const Picture& picture) {
   return halves;
 }
 
+constexpr int kWidth_px = 1100, kHeight_px = 960;
+
+/// So much wider is the picture where the numbers on the bar are long, so that they do not run into its
+/// title.
+int more_width_px(const Picture& picture) {
+  constexpr int kLettersThatFit = 5, kLetter_px = 16;
+  return kLetter_px * std::max(0, bar_letters(picture) - kLettersThatFit);
+}
+
+/// The usual frame, on a canvas that is wider on the right.
+PictureFrame widened(int more_px) {
+  PictureFrame frame;
+  const double share = static_cast<double>(kWidth_px) / (kWidth_px + more_px);
+  for (double* across : {&frame.left, &frame.right, &frame.bar_left, &frame.bar_width}) *across *= share;
+  frame.bar_label = 1 - share * (1 - frame.bar_label);
+  return frame;
+}
+
 }  // namespace
+
+int bar_letters(const Picture& picture) {
+  const BarRange bar = bar_range(picture);
+  return static_cast<int>(fmt::format("{:.{}f}", bar.end, bar.decimals).size()) + (picture.diverging ? 1 : 0);
+}
 
 DrawnPicture draw_picture(const Picture& picture, const PictureFrame& frame) {
   const Halves halves = halves_of(picture);
@@ -189,12 +230,13 @@ DrawnPicture draw_picture(const Picture& picture, const PictureFrame& frame) {
 }
 
 std::string gnuplot_script(const Picture& picture, const std::string& stem) {
-  const DrawnPicture drawn = draw_picture(picture);
+  const int more_px = more_width_px(picture);
+  const DrawnPicture drawn = draw_picture(picture, widened(more_px));
   std::string script = drawn.setup;
   for (const auto& [terminal, font_size] : {std::pair{"svg", 20}, std::pair{"pngcairo", 18}}) {  // look alike
     script += fmt::format(
-        "set terminal {} size 1100,960 font 'sans-serif,{}'\nset output '{}.{}'\n{}unset output\n", terminal,
-        font_size, stem, std::string(terminal).substr(0, 3), drawn.plot);
+        "set terminal {} size {},{} font 'sans-serif,{}'\nset output '{}.{}'\n{}unset output\n", terminal,
+        kWidth_px + more_px, kHeight_px, font_size, stem, std::string(terminal).substr(0, 3), drawn.plot);
   }
   return script;
 }

@@ -37,6 +37,9 @@ struct DrawnPicture {
   std::string setup, plot;
 };
 
+/// Letters of the longest number beside the colours.
+int bar_letters(const Picture& picture);
+
 DrawnPicture draw_picture(const Picture& picture, const PictureFrame& frame = {});
 
 /// A gnuplot script that writes `stem`.svg and `stem`.png into the working folder.

@@ -31,6 +31,10 @@ std::vector<std::filesystem::path> Staging::publish(const std::vector<std::strin
     files.push_back(target_ / name);
     if (std::filesystem::is_directory(files.back()))
       throw InputError::in(files.back().string(), "is a folder where a file is to be written");
+    const std::filesystem::path folder = files.back().parent_path();
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) throw InputError::in(folder.string(), "cannot be made: {}", error.message());
   }
   for (std::size_t i = 0; i < names.size(); ++i) {
     std::error_code error;

@@ -26,8 +26,9 @@ class Staging {
   /// Calls `write`, which writes to `path()`; where it fails its message names the target (output_place.h).
   void write(const std::function<void()>& write) const { write_as(target_, path_, write); }
 
-  /// Renames files of the scratch folder into the target, after a look at what alone could stop that
-  /// half-way. Returns where they are now; throws InputError naming the file that is in the way.
+  /// Renames files of the scratch folder, by their names in it ("a", "b/a"), into the target, after a look at
+  /// what alone could stop that half-way. Returns where they are now; throws InputError naming the file that
+  /// is in the way.
   std::vector<std::filesystem::path> publish(const std::vector<std::string>& names) const;
 
  private:

@@ -35,6 +35,8 @@ std::string wrong_with(const Json& flight) {
   if (!flight.is_object()) return "is no object";
   for (const char* key : {"tunnel", "scenario", "map", "position"})
     if (!flight.contains(key) || !flight[key].is_string()) return fmt::format("has no text {}", key);
+  if (const Json differs = flight.value("extrapolated", Json()); !differs.is_null() && !differs.is_string())
+    return "has an extrapolated that is no text";
   for (const char* key : {"walls", "controllers"})
     if (!flight.contains(key) || !flight[key].is_array() || flight[key].empty())
       return fmt::format("has no list {}", key);

@@ -1,6 +1,7 @@
 #include "cli/live/feed.h"
 
 #include "cli/live/run_alarms.h"
+#include "datasets/recorded_rate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -130,7 +131,8 @@ void LiveFeed::follow(const Position& position, const std::optional<Ledger>& led
   shared_.progress = {};
   if (!ledger) return;
   shared_.progress.ledger = *ledger;
-  shared_.progress.elapsed_s = static_cast<double>(ledger->frames_emitted) / info_.daq.sample_rate_hz;
+  shared_.progress.elapsed_s =
+      static_cast<double>(ledger->frames_emitted) / recorded_rate_hz(ledger, info_.daq.sample_rate_hz);
 }
 
 LiveFeed::Shared LiveFeed::shared() const {

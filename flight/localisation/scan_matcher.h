@@ -46,7 +46,7 @@ struct MatcherSettings {
   // What is rejected.
   std::size_t least_beams = 60;
   /// Of the beams with a return. Two walls of a wider tunnel, seen from their corner, can take up to
-  /// 0.76 of a scan.
+  /// 0.76 of a scan, and near the ceiling more (docs/localisation.md).
   double least_inliers = 0.78;
   double most_beyond = 0.1;  // of them: a beam cannot see through a wall, if it is the right tunnel
   /// Of all beams: so many must face the direction in which the position is known worst. A few beams beside a

@@ -81,6 +81,7 @@ TEST(Reduction, TermsEnterByName) {
   EXPECT_NEAR(reduce_runs(data, terms_from_names("air_humidity")).runs[0].c_t / thesis, 1.0044, 2e-4);
   EXPECT_EQ(terms_from_names("rotor_speed,air_pressure").name(), "air_pressure+rotor_speed");
   EXPECT_EQ(terms_from_names("thesis").name(), "thesis");
+  EXPECT_THAT(message_of([] { terms_from_names("foo"); }), HasSubstr("--with: 'foo' is no term"));
   const CampaignData without = given_thrusts("R1,OT,1,S1,2026-03-02T08:00Z,,7,7,7,7,20,,,5000\n");
   EXPECT_THAT(message_of([&] { reduce_runs(without, terms_from_names("air_pressure")); }),
               HasSubstr("run R1 has no air_pressure_Pa"));

@@ -140,6 +140,10 @@ TEST_F(BadInput, OptionsAndFilesThatAreNotThere) {
   EXPECT_THAT(refusal_of("import t.csv --format table --db c.db", {}),
               HasSubstr("--schema S.toml is required"));
   EXPECT_THAT(refusal_of("fly --now", {}), testing::Not(testing::IsEmpty()));
+  EXPECT_THAT(refusal_of("mapp --db c.db", {}), HasSubstr("mapp: there is no such verb"));
+  EXPECT_THAT(refusal_of("", {}), HasSubstr("A subcommand is required"));
+  EXPECT_THAT(refusal_of("fly --seed -1", {}), HasSubstr("--seed -1: must not be below 0"));
+  EXPECT_THAT(refusal_of("map --db c.db --out m --method foo", {}), HasSubstr("--method: 'foo' is no map"));
   EXPECT_THAT(refusal_of("log --db c.db --plan none.csv", {}), HasSubstr("none.csv: cannot be read"));
 }
 
@@ -301,8 +305,36 @@ TEST_F(BadInput, OptionsThatTheFileCannotServe) {
   fs::remove(folder / "t.db");
   campaign.write(folder / "source");
   ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
-  EXPECT_THAT(refusal_of("reduce --db c.db --plot p.svg", {"t.csv", "t.toml", "source", "c.db"}),
+  const std::vector<std::string> of_campaign = {"t.csv", "t.toml", "source", "c.db"};
+  EXPECT_THAT(refusal_of("reduce --db c.db --plot p.svg", of_campaign),
               HasSubstr("--plot: draws a table of observations"));
+  EXPECT_THAT(refusal_of("reduce --db c.db --no-spectra", of_campaign),
+              HasSubstr("--no-spectra: goes with --from-raw"));
+  for (const char* option : {"--format png", "--width-mm 100"})
+    EXPECT_THAT(refusal_of(std::string("report --db c.db --out r.html ") + option, of_campaign),
+                HasSubstr("it goes with --figures"));
+}
+
+TEST_F(BadInput, OptionsOfAnotherSource) {
+  for (const char* option :
+       {"--schema t.toml", "--sweeps s.csv", "--propeller-diameter-m 3", "--pole-count 14"})
+    EXPECT_THAT(refusal_of(std::string("import source --db c.db ") + option, {}),
+                HasSubstr("is not for --format folder"))
+        << option;
+  for (const char* option :
+       {"--sweeps s.csv", "--propeller-diameter-m 3", "--pole-count 14", "--allow-stuck"})
+    EXPECT_THAT(
+        refusal_of(std::string("import t.csv --format table --schema t.toml --db c.db ") + option, {}),
+        HasSubstr("is not for --format table"))
+        << option;
+  EXPECT_THAT(refusal_of("import s.csv --format rcbenchmark --allow-stuck --db c.db", {}),
+              HasSubstr("is not for --format rcbenchmark"));
+  for (const char* option : {"--faults drop=0.5", "--speed 3", "--seed 5"})
+    EXPECT_THAT(
+        refusal_of(std::string("log --db c.db --location OT --session S1 --source replay:b.bin ") + option,
+                   {}),
+        HasSubstr("is for the virtual rig"))
+        << option;
 }
 
 /// The coefficient stands in the table, the speed was not written down.

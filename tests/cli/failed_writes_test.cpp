@@ -104,6 +104,18 @@ TEST_F(FailedWrites, OfAFlightLeaveNoEmptyFolder) {
   EXPECT_THAT(left(), testing::ElementsAre("short.toml"));
 }
 
+/// The comparison fits, the log does not.
+TEST_F(FailedWrites, OfAFlightLeaveNothingHalfWritten) {
+  write_text(folder / "short.toml",
+             "format = \"tunnelrig-scenario/1\"\nname = \"short\"\n[[segments]]\nkind = \"circle\"\n"
+             "centre = [0, 0.65]\nradius_m = 0.1\nrate_rad_s = 1.5\nturns = 0.5\n");
+  const ProgramResult result = test::run_program(
+      folder.path(), "fly --scenario short.toml --controllers ibs --runs 1 --out a", "ulimit -f 4");
+  EXPECT_EQ(result.code, 2);
+  EXPECT_THAT(result.error, EndsWith("a/ibs.csv: cannot be written: File too large\n"));
+  EXPECT_THAT(left(), testing::ElementsAre("short.toml"));
+}
+
 bool says(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
 
 /// As a user whom the rights of files bind, be it root: 0 where all is as it should be, else what to look

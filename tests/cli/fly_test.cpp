@@ -37,7 +37,10 @@ struct Fly : testing::Test {
   }
 
   std::string refusal(const std::string& arguments) const {
-    const ProgramResult result = run(arguments + " --runs 1 --json no.json --out no");
+    return refusal_as_it_is(arguments + " --runs 1 --json no.json --out no");
+  }
+  std::string refusal_as_it_is(const std::string& arguments) const {
+    const ProgramResult result = run(arguments);
     EXPECT_EQ(result.code, 2) << arguments;
     EXPECT_EQ(result.out, "") << arguments;
     EXPECT_FALSE(std::filesystem::exists(folder / "no.json")) << arguments;
@@ -51,7 +54,8 @@ void expect_contract(const json& object) {
   EXPECT_EQ(object["format"], "tunnelrig-fly/1");
   for (const char* text : {"tunnel", "scenario", "map"}) EXPECT_TRUE(object.at(text).is_string()) << text;
   EXPECT_TRUE(object.at("seed").is_number_unsigned());
-  EXPECT_EQ(object.size(), 6U);
+  EXPECT_TRUE(object.at("extrapolated").is_null() || object["extrapolated"].is_string());
+  EXPECT_EQ(object.size(), 7U);
   ASSERT_FALSE(object.at("controllers").empty());
   for (const json& one : object["controllers"]) {
     EXPECT_EQ(one.size(), 12U);
@@ -145,13 +149,31 @@ TEST_F(Fly, OutHoldsLogsTablesAndPictures) {
     EXPECT_GT(std::filesystem::file_size(folder / "flights" / file), 500U) << file;
 }
 
+TEST_F(Fly, WhatWasFlownBeforeIntoTheSameFolderGoes) {
+  const std::string short_flight = "--scenario short.toml --runs 1 --out flights --controllers ";
+  ASSERT_EQ(run(short_flight + "ibs,indi").code, 0);
+  write_text(folder / "flights/notes.txt", "mine");
+  ASSERT_EQ(run(short_flight + "ibs").code, 0);
+  for (const char* gone : {"indi.csv", "indi-residual.csv"})
+    EXPECT_FALSE(std::filesystem::exists(folder / "flights" / gone)) << gone;
+  for (const char* kept : {"ibs.csv", "notes.txt", "flights.json", "comparison.csv"})
+    EXPECT_TRUE(std::filesystem::exists(folder / "flights" / kept)) << kept;
+}
+
 TEST_F(Fly, AScenarioFlownInTheTunnelThatItAsksFor) {
   std::string text = kShort;
   text.insert(text.find("[["), "tunnel = \"2.4\"\n");
   write_text(folder / "large.toml", text);
   EXPECT_EQ(flown("--scenario large.toml --controllers ibs --runs 1")["tunnel"], "2.4");
   EXPECT_EQ(flown("--scenario large.toml --tunnel 1.5 --controllers ibs --runs 1")["tunnel"], "1.5");
-  EXPECT_THAT(run("--scenario large.toml --controllers ibs --runs 1").error, HasSubstr("extrapolated"));
+  const ProgramResult result = run("--scenario large.toml --controllers ibs --runs 1 --out f --json f.json");
+  EXPECT_THAT(result.error, HasSubstr("extrapolated"));
+  EXPECT_THAT(result.out, HasSubstr("short in the 2.4 tunnel, 1 runs, extrapolated"));
+  const auto differs = HasSubstr("the map is of a tunnel of 1.5 x 1.5 m");
+  EXPECT_THAT(json::parse(read_text(folder / "f.json"))["extrapolated"].get<std::string>(), differs);
+  const json flights = json::parse(read_text(folder / "f/flights.json"));
+  EXPECT_THAT(flights["flights"][0]["extrapolated"].get<std::string>(), differs);
+  EXPECT_TRUE(flown("--scenario short.toml --controllers ibs --runs 1")["extrapolated"].is_null());
 }
 
 TEST_F(Fly, WhatIsNoMapIsRefused) {
@@ -184,8 +206,7 @@ TEST_F(Fly, ATunnelThatTheVehicleDoesNotFitIsRefused) {
 
 TEST_F(Fly, AResultWithoutAPlaceIsRefusedBeforeItIsFlown) {
   for (const char* option : {"--json", "--tune"}) {
-    const ProgramResult result =
-        run(std::string("--scenario short.toml --controllers ibs --runs 1 --budget 10 ") + option + " no/x");
+    const ProgramResult result = run(std::string("--controllers ibs ") + option + " no/x");
     EXPECT_EQ(result.code, 2) << option;
     EXPECT_EQ(result.out, "") << option;
     EXPECT_THAT(result.error, HasSubstr("no/x: cannot be written: there is no folder no")) << option;
@@ -196,16 +217,27 @@ TEST_F(Fly, OtherBadOptionsAreRefused) {
   EXPECT_THAT(refusal("--controllers lqr"), HasSubstr("no controller is called 'lqr'; there are ibs,"));
   EXPECT_THAT(refusal("--controllers ibs,indi,ibs"), HasSubstr("ibs is named twice"));
   for (const char* name : {"lqr", "pid-stock"})
-    EXPECT_THAT(refusal(std::string("--tune tuned.toml --controllers ") + name), HasSubstr(name));
+    EXPECT_THAT(refusal_as_it_is(std::string("--tune tuned.toml --controllers ") + name), HasSubstr(name));
   EXPECT_FALSE(std::filesystem::exists(folder / "tuned.toml"));
   write_text(folder / "of_two.toml", "format = \"tunnelrig-gains/1\"\n[ibs]\nk1_y = 3\n[pid]\nposz_p = 4\n");
-  EXPECT_THAT(refusal("--tune of_two.toml --controllers ibs"),
+  EXPECT_THAT(refusal_as_it_is("--tune of_two.toml --controllers ibs"),
               HasSubstr("has gains of pid, which are not tuned"));
   EXPECT_THAT(refusal("--position guessed"), HasSubstr("must be lidar, lidar-thesis or given"));
   EXPECT_THAT(refusal("--motor-loss 0.9"), HasSubstr("motor_loss"));
   EXPECT_THAT(refusal("--payload-kg nan"), HasSubstr("--payload-kg nan: a number is required"));
   write_text(folder / "g.toml", "format = \"tunnelrig-gains/1\"\n[ibs]\nk1_y = -3\n");
   EXPECT_THAT(refusal("--gains g.toml"), HasSubstr("g.toml:3: ibs.k1_y must be a number from"));
+}
+
+TEST_F(Fly, OptionsThatWouldDoNothingAreRefused) {
+  for (const char* option : {"--json f.json", "--out f", "--seed 3", "--motor-loss 0.1", "--runs 2"})
+    EXPECT_THAT(refusal_as_it_is(std::string("--tune t.toml --budget 10 --controllers ibs ") + option),
+                HasSubstr("does not go with --tune"))
+        << option;
+  EXPECT_FALSE(std::filesystem::exists(folder / "t.toml"));
+  EXPECT_THAT(refusal("--budget 20"), HasSubstr("--budget: is of tuning"));
+  EXPECT_THAT(refusal("--weak-rotor 2"), HasSubstr("--weak-rotor: says which rotor"));
+  EXPECT_THAT(refusal("--position given --lidar-sigma-mm 20"), HasSubstr("there is no LIDAR"));
 }
 
 }  // namespace

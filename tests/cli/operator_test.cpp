@@ -139,5 +139,30 @@ TEST(Operator, CtrlCAtTheQuestionEndsThereWithoutARun) {
   EXPECT_THAT(raw_runs(file), testing::IsEmpty());
 }
 
+/// What the program says on a terminal; `setting` for its environment.
+std::string said_on_a_terminal(const char* setting) {
+  int fd = -1;
+  const pid_t pid = ::forkpty(&fd, nullptr, nullptr, nullptr);
+  if (pid == 0) {
+    const std::array<const char*, 2> environment = {setting, nullptr};
+    const std::array<const char*, 4> arguments = {TUNNELRIG_PROGRAM, "doctor", "--db=none.db", nullptr};
+    ::execve(TUNNELRIG_PROGRAM, const_cast<char* const*>(arguments.data()),
+             const_cast<char* const*>(environment.data()));
+    ::_exit(127);
+  }
+  std::string said;
+  std::array<char, 4096> text{};
+  for (ssize_t size = 0; (size = ::read(fd, text.data(), text.size())) > 0;)
+    said.append(text.data(), static_cast<std::size_t>(size));
+  ::close(fd);
+  ::waitpid(pid, nullptr, 0);
+  return said;
+}
+
+TEST(Operator, ColoursAreLeftOutOnRequest) {
+  EXPECT_THAT(said_on_a_terminal("NO_COLOR="), testing::HasSubstr("\x1b[31mtunnelrig:\x1b[0m none.db"));
+  EXPECT_THAT(said_on_a_terminal("NO_COLOR=1"), testing::StartsWith("tunnelrig: none.db"));
+}
+
 }  // namespace
 }  // namespace tunnelrig

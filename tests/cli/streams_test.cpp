@@ -78,6 +78,21 @@ TEST_F(Streams, RefusedPacketsAreSaidEvenWhereNothingIsLost) {
   EXPECT_THAT(result.error, HasSubstr("run R0001: 1 packet was refused"));
 }
 
+TEST_F(Streams, ABoardThatSaysNoRateIsSaid) {
+  for (std::uint64_t i = 0; i < 50; ++i) add({.first = 16 * i, .ticks_per_frame = 0});
+  const ProgramResult result = log("0.6");
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.error, HasSubstr("run R0001: the board says no rate"));
+}
+
+TEST_F(Streams, AnotherRateThanTheCampaignsIsSaidWithItsSeconds) {
+  for (std::uint64_t i = 0; i < 100; ++i) add({.first = 16 * i, .ticks_per_frame = 42000});
+  const ProgramResult result = log("0.6");
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.out, HasSubstr(": 1200 frames, 0 lost")) << "0.6 s of the board's 2000 Hz";
+  EXPECT_THAT(result.error, HasSubstr("by the board the run is 0.600 s long"));
+}
+
 TEST_F(Streams, WithoutAPacketNoChannelIsStuck) {
   bytes = "a board of another make, perhaps";
   const ProgramResult result = log("1");

@@ -143,6 +143,9 @@ TEST(Faults, OptionTextIsChecked) {
   EXPECT_NE(test::message_of([] { parse_faults("drop=2"); }).find("a number from 0 to 1"), std::string::npos);
   EXPECT_NE(test::message_of([] { parse_faults("explode=1"); }).find("none of drop"), std::string::npos);
   EXPECT_EQ(parse_faults("stall=10:2.5").stall_s, 2.5);
+  for (const char* without : {"stall=1", "reboot=1"})
+    EXPECT_NE(test::message_of([&] { parse_faults(without); }).find("when and for how long"),
+              std::string::npos);
 }
 
 }  // namespace

@@ -165,6 +165,18 @@ TEST(Logger, ARunEndsWhereTheRateChanges) {
   EXPECT_EQ(outcome.ledger.frames_stored, 16u);
 }
 
+TEST(Logger, SecondsAreTheBoardsWhereItsRateIsAnother) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  VirtualBoard board({.frame_rate_hz = 2000, .pace = 0}, [] { return trw_frame{}; });
+  double last_elapsed_s = -1;
+  const LogOutcome outcome = log_run(
+      board, file, test::cells("R1"), {.duration_s = 3}, test::summarizer(),
+      [&](const LogProgress& progress) { last_elapsed_s = progress.elapsed_s; }, test::never_stop());
+  EXPECT_EQ(outcome.ledger.frames_emitted, 6000u);
+  EXPECT_NEAR(last_elapsed_s, 3, 1e-9);
+}
+
 /// Sixteen frames, then whatever it is given, for ever.
 class StrayBoard : public PacketSource {
  public:

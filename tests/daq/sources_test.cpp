@@ -38,11 +38,11 @@ TEST(Tcp, AHangUpIsAGapAndTheRunGoesOn) {
     ::close(second);
   });
   const auto source = open_source(server.name());
-  const LogOutcome outcome = log_run(*source, file, test::cells("R1"), {.duration_s = 6}, test::summarizer(),
+  const LogOutcome outcome = log_run(*source, file, test::cells("R1"), {.duration_s = 8}, test::summarizer(),
                                      {}, test::never_stop());
   board.join();
   EXPECT_EQ(outcome.state, RunState::kComplete);
-  EXPECT_EQ(outcome.ledger.frames_emitted, 8000u);
+  EXPECT_EQ(outcome.ledger.frames_emitted, 8000u) << "8 s of this board, which says 1000 Hz";
   EXPECT_EQ(outcome.ledger.frames_lost, 800u);
   EXPECT_EQ(outcome.ledger.source, server.name());
 }

@@ -65,6 +65,12 @@ double tic_step_m(const Json& walls, double plot_mm) {
   return 10 * decade_m;
 }
 
+/// For a caption: in a tunnel, or with a vehicle, that is not the map's.
+std::string extrapolation_note(const Json& flight) {
+  const Json differs = flight.value("extrapolated", Json());
+  return differs.is_string() ? fmt::format(" Extrapolated: {}.", differs.get<std::string>()) : "";
+}
+
 Figure paths_figure(const Json& flight, const std::string& name, double width_mm) {
   const std::size_t shown = std::min(flight["controllers"].size(), kMostPaths);
   constexpr double kLeft_mm = 15, kRight_mm = 2, kStrip_mm = 22, kLabel_mm = 10, kGap_mm = 2.5,
@@ -112,8 +118,9 @@ Figure paths_figure(const Json& flight, const std::string& name, double width_mm
   return {name, sheet, script + "unset multiplot\n",
           fmt::format("Simulated: {} in the {} tunnel, the first run of each controller; path in the "
                       "cross-section in metres, and reference less position over time in millimetres. Single "
-                      "runs have no bars; those of all runs are in the figure of errors.{}",
-                      flight["scenario"].get<std::string>(), flight["tunnel"].get<std::string>(), others)};
+                      "runs have no bars; those of all runs are in the figure of errors.{}{}",
+                      flight["scenario"].get<std::string>(), flight["tunnel"].get<std::string>(), others,
+                      extrapolation_note(flight))};
 }
 
 /// Mean error of each controller over its runs; crosses where one touched a wall.
@@ -166,9 +173,9 @@ Figure errors_figure(const Json& flight, const std::string& name, double width_m
       fmt::format(
           "Simulated: {} in the {} tunnel, {} runs of each controller. Root mean square error in y and z "
           "together, mean over the runs; bars: its 95 % interval (Student's t). Crosses: a controller that "
-          "touched a wall in at least one run.",
+          "touched a wall in at least one run.{}",
           flight["scenario"].get<std::string>(), flight["tunnel"].get<std::string>(),
-          controllers[0]["runs"].get<double>())};
+          controllers[0]["runs"].get<double>(), extrapolation_note(flight))};
 }
 
 }  // namespace

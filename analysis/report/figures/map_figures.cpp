@@ -2,6 +2,8 @@
 #include "analysis/maps/picture.h"
 #include "analysis/report/figures/figures.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 namespace tunnelrig::report {
@@ -12,16 +14,20 @@ namespace {
 constexpr int kPrintedNodes = 241;
 constexpr int kPrintedLevels = 9, kPrintedUncertaintyLevels = 4;
 
-constexpr double kLeft_mm = 14.2, kRight_mm = 17.5, kBottom_mm = 10, kTop_mm = 3;  // around the field
+constexpr double kLeft_mm = 14.2, kBottom_mm = 10, kTop_mm = 3;  // around the field
 
 struct MapTexts {
   const char *name, *symbol, *caption;
 };
 
-Sheet sheet_of(double width_mm) { return {width_mm, width_mm - kLeft_mm - kRight_mm + kBottom_mm + kTop_mm}; }
+/// Of the field, which leaves room for the colours and their numbers.
+double side_of(const Picture& picture, double width_mm) {
+  constexpr int kLettersThatFit = 5;
+  constexpr double kRight_mm = 17.5, kLetter_mm = 1.5;
+  return width_mm - kLeft_mm - kRight_mm - kLetter_mm * std::max(0, bar_letters(picture) - kLettersThatFit);
+}
 
-PictureFrame frame_of(const Sheet& sheet) {
-  const double side_mm = sheet.width_mm - kLeft_mm - kRight_mm;
+PictureFrame frame_of(const Sheet& sheet, double side_mm) {
   constexpr double kLabelWidth_mm = 6.2, kLabelHeight_mm = 2.6;
   return {.left = sheet.x(kLeft_mm),
           .right = sheet.x(kLeft_mm + side_mm),
@@ -37,9 +43,9 @@ PictureFrame frame_of(const Sheet& sheet) {
 
 Figure drawn_map(const Picture& picture, const std::string& name, const std::string& caption,
                  double width_mm) {
-  const Sheet sheet = sheet_of(width_mm);
-  const DrawnPicture drawn = draw_picture(picture, frame_of(sheet));
-  const double side_mm = width_mm - kLeft_mm - kRight_mm;
+  const double side_mm = side_of(picture, width_mm);
+  const Sheet sheet{width_mm, side_mm + kBottom_mm + kTop_mm};
+  const DrawnPicture drawn = draw_picture(picture, frame_of(sheet, side_mm));
   const std::string axes = sheet.axes({kLeft_mm, kLeft_mm + side_mm, kBottom_mm, kBottom_mm + side_mm},
                                       "← wall    ȳ [–]    wall →", "← ground    z̄ [–]    ceiling →", 11.2);
   const std::string small = fmt::format(

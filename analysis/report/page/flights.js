@@ -77,7 +77,7 @@ function flightsSection({flights, command}) {
     h('p', {}, prose('All of it is simulated: vehicle, air, LIDAR. Errors are reference less position; those of the ' +
       'table count from the scenario’s scored time on, contacts always.')),
     flights.map((flight) => {
-      const {tunnel, scenario, map, position} = flight;
+      const {tunnel, scenario, map, position, extrapolated} = flight;
       const title = `${scenario} in the ${tunnel} tunnel`;
       const caption = `The first run of each controller; map: ${map}; position: ${
           positions[position] ?? position}. Single runs have no error bars; the intervals of the table are Student’s, over the runs. A click on the legend hides or shows.`;
@@ -86,7 +86,7 @@ function flightsSection({flights, command}) {
         plot(`Error in y, ${title}`, () => 260, () => drawFlightErrors(flight, 'y_m', 'y')),
         plot(`Error in z, ${title}`, () => 260, () => drawFlightErrors(flight, 'z_m', 'z')),
         flightTable(flight),
-      ], caption, command);
+      ], extrapolated ? `Extrapolated, in normalised coordinates: ${extrapolated}. ${caption}` : caption, command);
     }),
   ];
 }

@@ -1,8 +1,8 @@
 // C_T and U by location: the thesis's figure 4.17, a curve for each column of the tunnel.
 
 const quantities = {
-  c_t: {plain: 'C<sub>T</sub>', unit: '', axis: 'C<sub>T</sub> [–]', format: '.4f'},
-  u_percent: {plain: 'U', unit: ' %', axis: 'U [%]', format: '~g'},
+  c_t: {plain: 'C<sub>T</sub>', unit: '', axis: 'C<sub>T</sub> [–]'},
+  u_percent: {plain: 'U', unit: ' %', axis: 'U [%]'},
 };
 
 /** "H3" where all locations of a column are the thesis's of that name. */
@@ -84,8 +84,7 @@ function drawColumns(columns, quantity, withSingles) {
     const curve = means(column.locations, x, quantity, colour, look);
     return withSingles ? [singles(column.locations, x, quantity, colour, group), curve] : [curve];
   });
-  const {axis: title, format} = quantities[quantity];
-  const yaxis = axis(title, {tickformat: format, zeroline: quantity === 'u_percent'});
+  const yaxis = axis(quantities[quantity].axis, {...bySteps, zeroline: quantity === 'u_percent'});
   return {data, layout: {xaxis: heightAxis(), yaxis}};
 }
 
@@ -94,10 +93,9 @@ function drawLabels(locations, quantity, withSingles) {
   const colour = rotorColours()[0];
   const x = locations.map((l) => plain(l.location));
   const points = means(locations, x, quantity, colour, {mode: 'markers', showlegend: false});
-  const {axis: title, format} = quantities[quantity];
   return {
     data: withSingles ? [singles(locations, x, quantity, colour, {}), points] : [points],
-    layout: {xaxis: axis('location', {type: 'category'}), yaxis: axis(title, {tickformat: format})},
+    layout: {xaxis: axis('location', {type: 'category'}), yaxis: axis(quantities[quantity].axis, bySteps)},
   };
 }
 

@@ -39,8 +39,10 @@ function layerOf(maps, field, layer) {
   const largest = Math.max(1e-6, ...values.map(Math.abs));
   const step = niceStep(largest / 5), greatest = step * Math.ceil(largest / step);
   const {plain: symbol} = fields[field];
+  const decimals = Math.max(2, decimalsOf(step) + 1);
   return {
     isValue,
+    decimals,
     rows: rowsOf(values, maps.y_norm.length),
     others: rowsOf(isValue ? maps[field].u95_percent : maps[field].value_percent, maps.y_norm.length),
     step,
@@ -48,8 +50,8 @@ function layerOf(maps, field, layer) {
     lowest: isValue ? -greatest : 0,
     spacing: niceStep((Math.max(...values) - Math.min(...values) || 1) / (isValue ? 14 : 5)),
     title: isValue ? `${symbol} [%]` : `U<sub>95</sub>(${symbol}) [%]`,
-    hover: isValue ? `${symbol} %{z:+.2f} ± %{customdata[0]} %` :
-                     `U<sub>95</sub> %{z:.2f} %, of ${symbol} %{customdata[0]} %`,
+    hover: isValue ? `${symbol} %{z:+.${decimals}f} ± %{customdata[0]} %` :
+                     `U<sub>95</sub> %{z:.${decimals}f} %, of ${symbol} %{customdata[0]} %`,
   };
 }
 
@@ -80,26 +82,40 @@ function lines(maps, layer, from, to, dash) {
   };
 }
 
-function colourBar({lowest, greatest, step, isValue, title}, narrow) {
-  const ticks =
-      Array.from({length: Math.round((greatest - lowest) / step) + 1}, (_, i) => greatest - i * step);
-  const below = {orientation: 'h', y: -0.16, yanchor: 'top', x: 0.5};
+// Fixed: square axes, their titles and the bar's would push each other about without end.
+const mapMargin = (narrow) => (narrow ? {l: 58, r: 28, t: 20, b: 118} : {l: 76, r: 118, t: 30, b: 60});
+
+const mapHeight = (width) => (isNarrow(width) ? width + 76 : Math.min(600, 0.86 * width));
+
+const kLetter_px = 7;  // of a number, as wide as it gets
+
+const kBarBelow_px = 54;  // under the axes: their numbers and title stand in between
+
+function colourBar({lowest, greatest, step, isValue, title}, width) {
+  const narrow = isNarrow(width), {l, r, t, b} = mapMargin(narrow);
+  const text = (tick) => fixed(tick, decimalsOf(step), isValue);
+  const all = Array.from({length: Math.round((greatest - lowest) / step) + 1}, (_, i) => greatest - i * step);
+  // Side by side long numbers would be turned round, out of the plot: then every second or third stands there.
+  const room = (width - l - r) / (kLetter_px * (1 + Math.max(...all.map((tick) => text(tick).length))));
+  const every = narrow ? Math.ceil(all.length / room) : 1;
+  const ticks = all.filter((tick) => Math.round(tick / step) % every === 0);
+  const below = {orientation: 'h', y: -kBarBelow_px / (mapHeight(width) - t - b), yanchor: 'top', x: 0.5};
   return {
     title: {text: title, side: narrow ? 'bottom' : 'top'},
     tickvals: ticks,
-    ticktext: ticks.map((tick) => fixed(tick, decimalsOf(step), isValue)),
+    ticktext: ticks.map(text),
     outlinewidth: 0,
     thickness: 14,
     ...(narrow ? below : {}),
   };
 }
 
-function heat(maps, layer, narrow) {
+function heat(maps, layer, width) {
   const metres = (norm, perNorm) => fixed(norm * perNorm, 3);
   const customdata = layer.others.map(
       (row, r) => row.map(
           (other, c) =>
-              [fixed(other, 2, !layer.isValue),
+              [fixed(other, layer.decimals, !layer.isValue),
                metres(maps.y_norm[c], maps.y_m_per_norm),
                metres(maps.z_norm[r], maps.z_m_per_norm),
   ]));
@@ -114,7 +130,7 @@ function heat(maps, layer, narrow) {
     zmin: layer.lowest,
     zmax: layer.greatest,
     colorscale: layer.isValue ? diverging : sequential,
-    colorbar: colourBar(layer, narrow),
+    colorbar: colourBar(layer, width),
     hovertemplate: `${layer.hover}<br>${place}<extra></extra>`,
   };
 }
@@ -147,11 +163,10 @@ function drawMap(maps, field, layerName, width) {
   const layer = layerOf(maps, field, layerName);
   const last = maps.y_norm.length, middle = (last - 1) / 2;
   const dash = (sign) => (onSide(maps, sign) ? 'solid' : 'dash');
-  const narrow = isNarrow(width);
   const side = {range: [-1, 1], constrain: 'domain', dtick: 0.5, zeroline: false, showgrid: false};
   return {
     data: [
-      heat(maps, layer, narrow),
+      heat(maps, layer, width),
       lines(maps, layer, 0, middle + 1, dash(-1)),
       lines(maps, layer, middle, last, dash(1)),
       ...crosses(maps, field),
@@ -159,8 +174,7 @@ function drawMap(maps, field, layerName, width) {
     layout: {
       xaxis: axis('← wall  ȳ = 2y/(w<sub>t</sub> − w<sub>q</sub>) [–]  wall →', side),
       yaxis: axis(heightTitle, {...side, scaleanchor: 'x'}),
-      // Fixed: square axes, their titles and the bar's would push each other about without end.
-      margin: {...(narrow ? {l: 58, r: 14, t: 20, b: 112} : {l: 76, r: 118, t: 30, b: 60}), autoexpand: false},
+      margin: {...mapMargin(isNarrow(width)), autoexpand: false},
     },
   };
 }
@@ -177,8 +191,7 @@ function mapFigure(maps, field) {
   let layer = 'value';
   const label =
       `Map of ${title.toLowerCase()} over the cross-section; its numbers are in the table of locations`;
-  const height = (width) => (isNarrow(width) ? width + 70 : Math.min(600, 0.86 * width));
-  const place = plot(label, height, (width) => drawMap(maps, field, layer, width));
+  const place = plot(label, mapHeight, (width) => drawMap(maps, field, layer, width));
   const layers = choice('Layer', {value: of, u95: `U95 of ${of}`}, (chosen) => {
     layer = chosen;
     redraw(place);

@@ -54,7 +54,7 @@ function drawAgainst(section, column, y) {
   }
   const xaxis =
       column ? heightAxis({range: [-1.15, 1.15]}) : axis('distance of the rotors from the plane [R]');
-  const yaxis = axis('C<sub>T</sub> [–]', {tickformat: '.4f', range: y});
+  const yaxis = axis('C<sub>T</sub> [–]', {...bySteps, range: y});
   return {
     data,
     layout: {xaxis, yaxis, shapes, showlegend: true, legend: {orientation: 'h', y: -0.2, yanchor: 'top'}}

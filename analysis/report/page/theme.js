@@ -48,6 +48,9 @@ const axis = (title, more = {}) => ({
   ...more,
 });
 
+/** Numbers of an axis with as many decimals as tell its ticks apart, however near they are, and no powers of ten. */
+const bySteps = {exponentformat: 'none'};
+
 const heightTitle = '← ground  z̄ = 2z/(h<sub>t</sub> − h<sub>q</sub>) [–]  ceiling →';
 
 const isNarrow = (width) => width < 560;

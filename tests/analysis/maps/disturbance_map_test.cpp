@@ -132,6 +132,8 @@ TEST(DisturbanceMap, NamesTheThrustThatNoRotorHas) {
               HasSubstr("m.json: the key uneven_thrust_percent must be from -100 to 100 %, holds 500"));
   EXPECT_THAT(refusal_of_value(&DisturbanceMap::delta_ct, 1, 3, -101),
               HasSubstr("m.json: the key delta_ct_percent must not be below -100 %, holds -101"));
+  EXPECT_THAT(refusal_of_value(&DisturbanceMap::delta_ct, 1, 3, 1e308),
+              HasSubstr("m.json: the key delta_ct_percent must not be above 1000 %, holds 1e+308"));
 }
 
 TEST(DisturbanceMap, NamesTheNodeThatIsNotTheMirrorImage) {

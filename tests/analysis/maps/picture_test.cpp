@@ -48,5 +48,16 @@ TEST(Picture, ValuesAreDrawnWithAllTheirLines) {
   EXPECT_THAT(script, HasSubstr(kLoop));
 }
 
+TEST(Picture, LongNumbersBesideTheColoursHaveRoomOfTheirOwn) {
+  Picture quiet = picture(true);
+  EXPECT_THAT(gnuplot_script(quiet, "u"), HasSubstr("size 1100,960"));
+  quiet.values.assign(9, 0.0042);  // −0.005 to 0.005
+  EXPECT_EQ(bar_letters(quiet), 6);
+  EXPECT_THAT(gnuplot_script(quiet, "u"), HasSubstr("size 1116,960"));
+  quiet.values.assign(9, 4.2e-6);
+  EXPECT_EQ(bar_letters(quiet), 9);
+  EXPECT_THAT(gnuplot_script(quiet, "u"), HasSubstr("set format cb '%.6f'"));
+}
+
 }  // namespace
 }  // namespace tunnelrig

@@ -1,5 +1,5 @@
 // Opens report pages in headless Chromium, uses their controls, and says what is wrong. The first page is
-// opened wide and light, and narrow and dark; those behind it, which differ in their data, in turns.
+// opened wide and light, narrow and dark, and where two plots just stand side by side; those behind it, which differ in their data, in turns.
 //
 //   node open_pages.mjs CHROMIUM PROFILE_FOLDER PAGE.html…
 //
@@ -13,7 +13,7 @@ import {basename, join, resolve} from 'node:path';
 import {pathToFileURL} from 'node:url';
 
 const [chromium, profile, ...pages] = process.argv.slice(2);
-const views = [{width: 1280, scheme: 'light'}, {width: 400, scheme: 'dark'}];
+const views = [{width: 1280, scheme: 'light'}, {width: 400, scheme: 'dark'}, {width: 1200, scheme: 'light'}];
 const patience_ms = 60_000;
 
 /** Chromium, and a way to call it: call(method, parameters, session) and listeners of events. */
@@ -120,16 +120,28 @@ async function look(browser, page, {width, scheme}) {
 }
 
 /** Run in the page: what is too wide, what is empty, and plots without a drawing. */
-const findings = `JSON.stringify([
+const findings = `{
+const flights = JSON.parse(document.getElementById("data").textContent).sections?.flights?.flights ?? [];
+JSON.stringify([
   ...(document.documentElement.scrollWidth > innerWidth ? ["wider than the window: " + document.documentElement.scrollWidth + " pixels"] : []),
   ...[...document.querySelectorAll("section")].filter((s) => s.children.length < 2).map((s) => "section " + s.id + " is empty"),
   ...[...document.querySelectorAll(".plot")].filter((p) => !p.querySelector(".main-svg .trace, .main-svg .hm, .main-svg .points path"))
     .map((p) => "nothing is drawn in: " + p.getAttribute("aria-label")),
-  ...(JSON.parse(document.getElementById("data").textContent).sections?.flights?.flights ?? [])
-    .filter((f) => f.position !== "given" && !document.body.innerText.includes("position: from LIDAR scans"))
+  ...flights.filter((f) => f.position !== "given" && !document.body.innerText.includes("position: from LIDAR scans"))
     .map((f) => "the page does not say that the position of " + f.scenario + " is by " + f.position),
+  ...flights.filter((f) => f.extrapolated && !document.body.innerText.includes("Extrapolated, in normalised coordinates: " + f.extrapolated))
+    .map((f) => "the page does not say that " + f.scenario + " is extrapolated"),
+  ...[...document.querySelectorAll(".plot .yaxislayer-above, .plot .xaxislayer-above")].flatMap((axis) => {
+    const numbers = [...axis.querySelectorAll(".ytick text, .xtick text")].map((t) => t.textContent).filter((t) => /^[−+]?[0-9.]+$/.test(t));
+    return new Set(numbers).size < numbers.length ? ["an axis has the same number twice: " + numbers.join(" ")] : [];
+  }),
+  ...[...document.querySelectorAll(".plot")].filter((p) => {
+    const room = p.getBoundingClientRect();
+    return [...p.querySelectorAll(".infolayer .colorbar text")].map((t) => t.getBoundingClientRect())
+      .some((t) => t.left < room.left - 1 || t.right > room.right + 1 || t.top < room.top - 1 || t.bottom > room.bottom + 1);
+  }).map((p) => "the colour bar is cut off in: " + p.getAttribute("aria-label")),
   ...(/undefined|NaN|\\[object/.test(document.body.innerText) ? ["a value that is none stands in the text"] : []),
-])`;
+])}`;
 
 /** Run in the page: every control once, and a print. */
 const exercise = `
