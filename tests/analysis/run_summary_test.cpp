@@ -272,6 +272,8 @@ TEST(RunSummary, WhatAMultipleOfTheShaftMayBeIsNoHum) {
   EXPECT_EQ(names(5230, {100, 250}, {})[250], "mains_250");
   EXPECT_EQ(names(5230, {60}, {})[60], "mains_60");
   EXPECT_EQ(names(5230, {60}, 50)[60], "") << "of another grid than the campaign's";
+  EXPECT_EQ(names(3700, {60.1}, 60, 0.03)[62], "shaft") << "beside a stronger hum";
+  EXPECT_EQ(names(3700, {60.1}, 60, 0.03)[60], "mains_60");
   EXPECT_EQ(names(5230, {2 * 5230.0 / 60}, {}, 0)[174], "blade_pass") << "of a propeller without imbalance";
 }
 
