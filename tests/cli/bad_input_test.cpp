@@ -11,6 +11,7 @@
 #include <functional>
 #include <future>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -207,6 +208,27 @@ TEST_F(BadInput, CalibrationThatSaysNothing) {
   write_text(folder / "mine.csv", campaign.calibration_csv);
   EXPECT_THAT(refusal_of("calibrate --db c.db --points mine.csv", {"source", "c.db", "mine.csv"}),
               HasSubstr("mine.csv: cell 1"));
+}
+
+/// Squares of such numbers are not finite: what was computed with them was not a number, or a crash.
+TEST_F(BadInput, NumbersThatNothingMeasures) {
+  for (const auto& [column, row, value] :
+       {std::tuple{"applied_force_N", "1,1e155,1.5\n", "1e+155"}, {"voltage_V", "1,5,1e300\n", "1e+300"}}) {
+    campaign = {};
+    campaign.calibration_csv = fmt::format("cell,applied_force_N,voltage_V\n{}", row);
+    EXPECT_THAT(refusal(),
+                HasSubstr(fmt::format("calibration.csv:2: column {}: {} is beyond", column, value)));
+  }
+  campaign = {};
+  campaign.write(folder / "source");
+  ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
+  write_text(folder / "mine.csv", "cell,applied_force_N,voltage_V\n1,5,1.5\n1,-1e155,1.8\n");
+  EXPECT_THAT(refusal_of("calibrate --db c.db --points mine.csv", {"source", "c.db", "mine.csv"}),
+              HasSubstr("mine.csv:3: column applied_force_N: -1e+155 is beyond"));
+  write_text(folder / "mine.csv", "fx,fy,fz,rx,ry,rz\n");
+  EXPECT_THAT(refusal_of("calibrate --matrix mine.csv --forces fx,fy,fz --readings rx,ry,rz",
+                         {"source", "c.db", "mine.csv"}),
+              HasSubstr("mine.csv: there is no row"));
 }
 
 /// A row that no verb could read again would lock the whole file.
