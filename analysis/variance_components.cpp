@@ -1,5 +1,7 @@
 #include "analysis/variance_components.h"
 
+#include "calibration/distributions.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -64,27 +66,57 @@ struct Prior {
   double dof = std::numeric_limits<double>::infinity();
 };
 
+constexpr double kAlike = 0.05;  // p above which locations are taken to scatter alike
+
+/// The p of Bartlett's test that variances of so many degrees of freedom are one (Snedecor & Cochran 1989,
+/// 13.10): it depends on the degrees of freedom and not on the variances seen, so that a location that
+/// scatters much cannot hide itself by widening what counts as chance.
+double homogeneity_p(const std::vector<double>& variance, const std::vector<double>& dof) {
+  const std::size_t n = variance.size();
+  if (n < 2) return 1;
+  double all_squares = 0, all_dof = 0, logarithms = 0, reciprocals = 0;
+  for (std::size_t l = 0; l < n; ++l) {
+    all_squares += dof[l] * variance[l];
+    all_dof += dof[l];
+    logarithms += dof[l] * std::log(variance[l]);
+    reciprocals += 1 / dof[l];
+  }
+  const auto others = static_cast<double>(n - 1);
+  const double correction = 1 + (reciprocals - 1 / all_dof) / (3 * others);
+  const double statistic = (all_dof * std::log(all_squares / all_dof) - logarithms) / correction;
+  return chi2_upper_p(std::max(0.0, statistic), others);
+}
+
 Prior prior_of(const std::vector<double>& squares, const std::vector<double>& dof, double pooled) {
   Prior prior{.variance = pooled};
-  std::vector<double> scores;
+  std::vector<double> scores, variance, freedom;
   double trigammas = 0;
   for (std::size_t l = 0; l < dof.size(); ++l) {
     if (dof[l] < 1 || squares[l] <= 0) continue;
+    variance.push_back(squares[l] / dof[l]);
+    freedom.push_back(dof[l]);
     scores.push_back(std::log(squares[l] / dof[l]) - digamma(dof[l] / 2) + std::log(dof[l] / 2));
     trigammas += trigamma(dof[l] / 2);
   }
-  constexpr std::size_t kFewLocations = 5;
-  if (scores.size() < kFewLocations) return prior;
+  if (homogeneity_p(variance, freedom) > kAlike) return prior;
   const auto count = static_cast<double>(scores.size());
   double mean = 0, spread = 0;
   for (const double score : scores) mean += score / count;
   for (const double score : scores) spread += (score - mean) * (score - mean) / (count - 1);
   const double excess = spread - trigammas / count;
-  // The spread has itself an error; within two of it, the locations are taken to scatter alike.
-  if (excess <= 2 * spread * std::sqrt(2 / (count - 1))) return prior;
+  if (excess <= 0) return prior;
   prior.dof = 2 * inverse_trigamma(excess);
   prior.variance = std::exp(mean + digamma(prior.dof / 2) - std::log(prior.dof / 2));
   return prior;
+}
+
+/// The weight that the prior has at a location, in degrees of freedom: less where it makes the location's own
+/// variance an improbably large one, and none where it rules it out, or else the noisiest would get the
+/// smallest error bars for their scatter (Phipson et al. 2016, Ann. Appl. Stat. 10:946).
+double weight_of(const Prior& prior, double squares, double dof) {
+  if (dof < 1) return prior.dof;
+  const double p = f_upper_p(squares / dof / prior.variance, dof, prior.dof);
+  return prior.dof * std::min(1.0, 2 * p);
 }
 
 void fit_run_variances(const Design& design, VarianceComponents& components) {
@@ -104,9 +136,10 @@ void fit_run_variances(const Design& design, VarianceComponents& components) {
   const Prior prior = prior_of(squares, dof, components.run);
   for (std::size_t l = 0; l < design.locations; ++l) {
     const bool alike = std::isinf(prior.dof);
+    const double weight = alike ? 0 : weight_of(prior, squares[l], dof[l]);
     components.run_by_location[l] =
-        alike ? components.run : (prior.dof * prior.variance + squares[l]) / (prior.dof + dof[l]);
-    components.run_dof[l] = alike ? all_dof : prior.dof + dof[l];
+        alike ? components.run : (weight * prior.variance + squares[l]) / (weight + dof[l]);
+    components.run_dof[l] = alike ? all_dof : weight + dof[l];
   }
 }
 

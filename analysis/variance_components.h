@@ -17,10 +17,11 @@ struct GroupedRuns {
 /// Variances of y = location + session + visit + run, where a visit is what one location saw of one session.
 ///
 /// Runs within a visit give the run variance of each location, moderated: a location of few runs leans on the
-/// others as far as the locations resemble each other (Smyth 2004, Stat. Appl. Genet. Mol. Biol. 3:3). The
-/// visit and session variances maximise the restricted likelihood (REML; Patterson & Thompson 1971) of the
-/// visits' means with locations fixed. A component that the design cannot show is absent, not zero: `…_known`
-/// says so.
+/// others as far as the locations resemble each other (Smyth 2004, Stat. Appl. Genet. Mol. Biol. 3:3), one
+/// that scatters unlike them leans less. Where Bartlett's test finds them alike they are pooled. The visit
+/// and session variances maximise the restricted likelihood (REML; Patterson & Thompson 1971) of the visits'
+/// means with locations fixed. A component that the design cannot show is absent, not zero: `…_known` says
+/// so.
 struct VarianceComponents {
   bool run_known = false, visit_known = false, session_known = false;
   std::vector<double> run_by_location;  // σ² of one run there

@@ -269,6 +269,8 @@ std::vector<CrosstalkRow> suspicious_rows(const CrosstalkTable& table, const Cro
 }  // namespace
 
 CrosstalkFit fit_crosstalk(const CrosstalkTable& table, const CrosstalkOptions& options) {
+  if (table.force_N.rows() == 0)  // before anything looks for the least of its forces
+    throw InputError::in(table.file, "there is no row of forces and readings");
   for (Eigen::Index channel = 0; channel < table.size(); ++channel) {
     check_table(table, terms_of(table, options, channel, options.shape));
   }

@@ -1,5 +1,6 @@
 #include "calibration/crosstalk.h"
 #include "datasets/error.h"
+#include "datasets/plausible.h"
 #include "datasets/units.h"
 
 namespace tunnelrig {
@@ -16,6 +17,8 @@ CrosstalkTable read_crosstalk(const Sheet& sheet, const CrosstalkSpec& spec) {
   if (unit.quantity != "force") {
     throw InputError::in(sheet.file, "'{}' is a unit of {}, not of force", spec.force_unit, unit.quantity);
   }
+  for (const auto* names : {&spec.force_columns, &spec.reading_columns})
+    for (const std::string& name : *names) sheet.require(name);
   const auto rows = static_cast<Eigen::Index>(sheet.rows.size()), columns = static_cast<Eigen::Index>(n);
   CrosstalkTable table{.file = sheet.file,
                        .axes = spec.force_columns,
@@ -27,8 +30,9 @@ CrosstalkTable read_crosstalk(const Sheet& sheet, const CrosstalkSpec& spec) {
     const auto i = static_cast<Eigen::Index>(row);
     for (std::size_t column = 0; column < n; ++column) {
       const auto j = static_cast<Eigen::Index>(column);
-      table.force_N(i, j) = unit.convert(sheet.require_number(row, spec.force_columns[column]));
-      table.reading(i, j) = sheet.require_number(row, spec.reading_columns[column]);
+      const double most = kMostForce_N / unit.factor;
+      table.force_N(i, j) = unit.convert(sheet.require_number_within(row, spec.force_columns[column], most));
+      table.reading(i, j) = sheet.require_number_within(row, spec.reading_columns[column], kMostReading);
     }
     const bool zero = (table.force_N.row(i).array() == 0).all();
     const int before = table.block.empty() ? 0 : table.block.back();

@@ -203,6 +203,14 @@ double Sheet::require_number(std::size_t row, std::string_view column) const {
   throw InputError(fmt::format("{}: a number is required here", where(row, column)));
 }
 
+double Sheet::require_number_within(std::size_t row, std::string_view column, double most) const {
+  const double value = require_number(row, column);
+  if (std::abs(value) > most)
+    throw InputError(
+        fmt::format("{}: {:g} is beyond all that is measured ({:g})", where(row, column), value, most));
+  return value;
+}
+
 int Sheet::require_integer(std::size_t row, std::string_view column, int lowest, int highest) const {
   const double value = require_number(row, column);
   if (value != std::floor(value) || value < lowest || value > highest) {

@@ -42,6 +42,9 @@ struct Sheet {
   /// As `number`, for a cell that must not be empty.
   double require_number(std::size_t row, std::string_view column) const;
 
+  /// As `require_number`, for a number that is at most `most` in size: sums of its squares must stay finite.
+  double require_number_within(std::size_t row, std::string_view column, double most) const;
+
   /// As `require_number`, for whole numbers from `lowest` to `highest`.
   int require_integer(std::size_t row, std::string_view column, int lowest, int highest) const;
 

@@ -5,6 +5,10 @@
 
 namespace tunnelrig {
 
+/// Beyond any rocket, and any reading of a converter, be it in counts of 32 bits.
+inline constexpr double kMostForce_N = 1e9;
+inline constexpr double kMostReading = 1e10;
+
 /// T / (½ρΩ²R² πR²) of one rotor. The static points of the UIUC data base lie between 0.012 and 0.046.
 inline constexpr double kMostRotorCoefficient = 0.3;
 

@@ -2,6 +2,7 @@
 #include "datasets/error.h"
 #include "datasets/locations.h"
 #include "datasets/lower_case.h"
+#include "datasets/plausible.h"
 #include "datasets/run_columns.h"
 
 #include <algorithm>
@@ -263,8 +264,8 @@ std::vector<CalibrationPoint> parse_calibration(const Sheet& sheet, int rotors) 
     CalibrationPoint point;
     point.line = sheet.rows[row].line;
     point.cell = sheet.require_integer(row, "cell", 1, rotors);
-    point.applied_force_N = sheet.require_number(row, "applied_force_N");
-    point.voltage_V = sheet.require_number(row, "voltage_V");
+    point.applied_force_N = sheet.require_number_within(row, "applied_force_N", kMostForce_N);
+    point.voltage_V = sheet.require_number_within(row, "voltage_V", kMostReading);
     if (sheet.number(row, "sequence")) {
       point.sequence = sheet.require_integer(row, "sequence", 0, std::numeric_limits<int>::max());
     }
@@ -292,7 +293,7 @@ std::vector<PropellerTest> parse_propellers(const Sheet& sheet, int rotors) {
       throw InputError(
           fmt::format("{}: '{}' is neither CW nor CCW", sheet.where(row, "direction"), test.direction));
     }
-    test.thrust_N = sheet.require_number(row, "thrust_N");
+    test.thrust_N = sheet.require_number_within(row, "thrust_N", kMostForce_N);
     if (test.thrust_N <= 0) {
       throw InputError(fmt::format("{}: a propeller's thrust is above 0 N", sheet.where(row, "thrust_N")));
     }

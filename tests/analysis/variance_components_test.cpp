@@ -1,15 +1,18 @@
 #include "analysis/variance_components.h"
 
+#include "calibration/distributions.h"
 #include "support/seeds.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <random>
 #include <utility>
 
 #include <Eigen/LU>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 namespace tunnelrig {
@@ -91,6 +94,60 @@ TEST(VarianceComponents, LocationsThatScatterDifferentlyKeepTheirOwn) {
   for (const double variance : alike.run_by_location)
     EXPECT_EQ(variance, alike.run) << "what chance explains is pooled";
 }
+
+struct NoisyLocation {
+  std::size_t locations = 6;
+  double factor = 1;                               // by which location 0 scatters more
+  double at_least = 0.93, others_at_least = 0.93;  // coverage there, and elsewhere
+  double pooled_at_least = 0, pooled_at_most = 1;  // the share of campaigns whose scatter is pooled
+};
+
+/// Two sessions of five runs, at one location more scatter: whether the means' 95 % intervals hold the truth.
+class NoisyLocations : public testing::TestWithParam<NoisyLocation> {};
+
+TEST_P(NoisyLocations, HaveErrorBarsOfTheirOwn) {
+  const NoisyLocation& noisy = GetParam();
+  const std::uint64_t seed = test::seed();
+  SCOPED_TRACE(seed);
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<double> unit;
+  constexpr int kCampaigns = 400;
+  const double run = 0.3, more = run * std::sqrt(noisy.factor * noisy.factor - 1);
+  double covered = 0, others = 0, pooled = 0;  // shares
+  for (int i = 0; i < kCampaigns; ++i) {
+    GroupedRuns runs = simulate({.locations = noisy.locations, .sessions = 2, .per_visit = 5, .visits = 2},
+                                run, 0, 0, engine);
+    for (std::size_t r = 0; r < 10; ++r) runs.value[r] += more * unit(engine);
+    const VarianceComponents found = fit_variance_components(runs);
+    const LocationMeans means = location_means(runs, found);
+    for (std::size_t l = 0; l < noisy.locations; ++l) {
+      const auto row = static_cast<Eigen::Index>(l);
+      const double u95 = half_width_95(std::sqrt(means.covariance(row, row)), means.dof[l]);
+      if (std::abs(means.mean[l] - static_cast<double>(l)) > u95) continue;
+      (l == 0 ? covered : others) += 1.0 / kCampaigns;
+    }
+    pooled += found.run_by_location[0] == found.run ? 1.0 / kCampaigns : 0;
+  }
+  others /= static_cast<double>(noisy.locations - 1);
+  std::printf("%zu locations, one with %g times the scatter: %.3f covered, others %.3f; pooled in %.2f\n",
+              noisy.locations, noisy.factor, covered, others, pooled);
+  EXPECT_GT(covered, noisy.at_least);
+  EXPECT_GT(others, noisy.others_at_least);
+  EXPECT_GE(pooled, noisy.pooled_at_least);
+  EXPECT_LE(pooled, noisy.pooled_at_most);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Campaigns, NoisyLocations,
+    testing::Values(NoisyLocation{.factor = 1, .at_least = 0.92, .pooled_at_least = 0.9},
+                    NoisyLocation{.locations = 42, .factor = 1, .at_least = 0.92, .pooled_at_least = 0.9},
+                    NoisyLocation{.factor = 3, .at_least = 0.9, .pooled_at_most = 0.2},
+                    NoisyLocation{.factor = 6, .at_least = 0.91, .pooled_at_most = 0.02},
+                    NoisyLocation{.locations = 3, .factor = 6, .at_least = 0.91, .pooled_at_most = 0.02},
+                    NoisyLocation{.locations = 20, .factor = 6, .at_least = 0.91, .pooled_at_most = 0.02}),
+    [](const auto& noisy) {
+      return fmt::format("{}LocationsOneWithScatterTimes{:g}", noisy.param.locations, noisy.param.factor);
+    });
 
 /// ½ tr(P V_k P V_l), written out with a matrix of visits times visits.
 TEST(VarianceComponents, TheirCovarianceIsTheInverseInformation) {

@@ -45,6 +45,22 @@ TEST(Crosstalk, AKnownMatrixComesBackAndSoDoTheForces) {
   }
 }
 
+TEST(Crosstalk, TheCoefficientsU95HoldsTheTruth) {
+  SyntheticTable truth = three_axes();
+  truth.noise = 0.01;
+  double held = 0, all = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    std::mt19937 engine(seed);
+    const CrosstalkFit fit = fit_crosstalk(truth.take(engine));
+    const Eigen::ArrayXXd off = (fit.matrix - truth.matrix).array().abs();
+    held += static_cast<double>((off <= fit.matrix_u95().array()).count());
+    all += static_cast<double>(off.size());
+    EXPECT_THAT(format_crosstalk(fit), HasSubstr("Its U95"));
+  }
+  EXPECT_GT(held / all, 0.9);
+  EXPECT_LT(held / all, 0.99);
+}
+
 TEST(Crosstalk, OneCommonZeroAndNoSignTermsAreChoices) {
   std::mt19937 engine(2);
   CrosstalkTable table = both_ways().take(engine);
@@ -100,6 +116,9 @@ TEST(Crosstalk, RefusesWhatDoesNotDetermineTheMatrix) {
   CrosstalkTable broken = three_axes().take(engine);
   broken.reading(3, 1) = std::nan("");
   EXPECT_THAT(refusal(broken), HasSubstr("not finite"));
+  const Sheet header = parse_csv("fx,fy,sx,sy\n", "header.csv");
+  EXPECT_THAT(refusal(read_crosstalk(header, {{"fx", "fy"}, {"sx", "sy"}, "N"})),
+              HasSubstr("header.csv: there is no row of forces and readings"));
 }
 
 const CrosstalkSpec kSpec{{"fx", "fy"}, {"sx", "sy"}, "gf"};
@@ -125,6 +144,12 @@ TEST(Crosstalk, ReadingNamesFileLineAndColumn) {
   EXPECT_THAT(refusal({{"fx", "fy"}, {"sx", "sy"}, "rpm"}),
               HasSubstr("'rpm' is a unit of speed, not of force"));
   EXPECT_THAT(refusal({{"fx", "fy"}, {"sx"}, "N"}), HasSubstr("as many of each"));
+  const auto of = [](const char* text) {
+    return message_of([&] { read_crosstalk(parse_csv(text, "cell.csv"), kSpec); });
+  };
+  EXPECT_THAT(of("fx,fz,sx,sy\n"), HasSubstr("cell.csv:1: the required column fy is missing"));
+  EXPECT_THAT(of("fx,fy,sx,sy\n0,1e155,1,2\n"), HasSubstr("cell.csv:2: column fy: 1e+155 is beyond"));
+  EXPECT_THAT(of("fx,fy,sx,sy\n0,1,1,2\n0,1,-1e300,2\n"), HasSubstr("cell.csv:3: column sx: -1e+300"));
 }
 
 // --- FARE-KE (telenaco/FARE-KE): three three-axis cells, measured -----------------------------------------
