@@ -39,17 +39,11 @@ double correlation_within(const Observations& observations, const std::vector<in
 double likelihood_beside_own(const Observations& observations, const NullFit& fit,
                              const std::vector<int>& rows) {
   double log_size = 0;
-  const Index own_columns = observations.beyond.cols();
   for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
-    const VectorXd weight = observations.scatter.of_runs(own).cwiseInverse();
-    const MatrixXd slopes = weight.asDiagonal() * observations.slopes(own, Eigen::all);
-    MatrixXd others(weight.size(), 1 + observations.first_own_slope());
-    others << weight, slopes.leftCols(observations.first_own_slope());
-    const MatrixXd columns = slopes.rightCols(own_columns);
-    const MatrixXd seen = columns - others * others.completeOrthogonalDecomposition().solve(columns);
-    const VectorXd sizes = Eigen::ColPivHouseholderQR<MatrixXd>(seen).matrixR().diagonal().cwiseAbs();
-    for (const double size : sizes)
-      if (size > kLeastSeen * columns.norm()) log_size += std::log(size);
+    MatrixXd columns(static_cast<Index>(own.size()), 1 + observations.slopes.cols());
+    columns << VectorXd::Ones(columns.rows()), observations.slopes(own, Eigen::all);
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(columns);
+    log_size += qr.matrixR().diagonal().head(qr.rank()).array().abs().log().sum();
   }
   return fit.log_likelihood + log_size;
 }
