@@ -83,6 +83,10 @@ struct CrosstalkFit {
     Eigen::MatrixXd covariance;   // n × n, N², from that of the coefficients
   };
 
+  /// Half widths of the coefficients' 95 % intervals, n × n, of `matrix` and of `even`.
+  Eigen::MatrixXd matrix_u95() const;
+  Eigen::MatrixXd even_u95() const;
+
   /// Forces from readings and the zeros of the same channels, both of n.
   Forces forces(const Eigen::VectorXd& reading, const Eigen::VectorXd& zero) const;
 };

@@ -33,20 +33,22 @@ std::optional<Sheet> read_if_given(const std::string& path) {
   return read_csv(path);
 }
 
-/// The certificate; a refusal names the files that were given where these are not the campaign's own sheets.
+/// A message that names the file that was given where this is not the campaign's own sheet.
+std::string as_named(const std::string& message, const CalibrateOptions& options) {
+  for (const auto& [sheet, given] :
+       {std::pair<std::string_view, std::string>{"calibration.csv", options.points},
+        {"propellers.csv", options.propellers}})
+    if (!given.empty() && message.starts_with(sheet)) return given + message.substr(sheet.size());
+  return message;
+}
+
 Certificate calibrate_as_named(const std::vector<CalibrationPoint>& points,
                                const std::vector<PropellerTest>& tests, const CalibrationOptions& how,
                                const CalibrateOptions& options) {
   try {
     return calibrate(points, tests, how);
   } catch (const InputError& error) {
-    const std::string_view message = error.what();
-    for (const auto& [sheet, given] :
-         {std::pair<std::string_view, std::string>{"calibration.csv", options.points},
-          {"propellers.csv", options.propellers}})
-      if (!given.empty() && message.starts_with(sheet))
-        throw InputError(given + std::string(message.substr(sheet.size())));
-    throw;
+    throw InputError(as_named(error.what(), options));
   }
 }
 
@@ -61,11 +63,12 @@ int calibrate_campaign(const CalibrateOptions& options) {
   const auto points =
       new_points ? parse_calibration(*new_points, info.rig.rotors) : file.calibration_points();
   const auto tests = new_tests ? parse_propellers(*new_tests, info.rig.rotors) : file.propeller_tests();
+  if (points.empty() && new_points) throw InputError::in(options.points, "holds no calibration points");
   if (points.empty())
     throw InputError::in(options.db, "holds no calibration points; --points calibration.csv adds them");
   Certificate certificate = calibrate_as_named(points, tests, how, options);
-  for (std::string& doubt : calibration_doubts(file, points))
-    certificate.warnings.push_back(std::move(doubt));
+  for (const std::string& doubt : calibration_doubts(file, points))
+    certificate.warnings.push_back(as_named(doubt, options));
   const nlohmann::json inputs{{"points", certificate.points_hash}};
   std::int64_t id = 0;
   file.atomically([&] {  // only what is to be written: a recorder may be waiting
@@ -111,6 +114,36 @@ int run_calibrate(const CalibrateOptions& options) {
   return calibrate_campaign(options);
 }
 
+/// Refused beside --matrix, which has nothing to do with a campaign.
+void add_campaign_options(CLI::App& verb, CalibrateOptions& options, CLI::Option& matrix) {
+  verb.add_option("--db", options.db, "Campaign file")->excludes(&matrix);
+  verb.add_option("--points", options.points, "CSV of calibration points, in place of those in the file")
+      ->excludes(&matrix);
+  verb.add_option("--propellers", options.propellers, "CSV of propeller tests, in place of those in the file")
+      ->excludes(&matrix);
+  verb.add_option("--loss", options.loss, "How much a point far from the line counts")
+      ->check(CLI::IsMember({"ordinary", "huber", "cauchy", "tukey"}))
+      ->capture_default_str()
+      ->excludes(&matrix);
+}
+
+/// Refused without --matrix.
+void add_matrix_options(CLI::App& verb, CalibrateOptions& options, CLI::Option& matrix) {
+  verb.add_option("--forces", options.forces, "Its force columns")->delimiter(',')->needs(&matrix);
+  verb.add_option("--readings", options.readings, "Its reading columns, in the same order")
+      ->delimiter(',')
+      ->needs(&matrix);
+  verb.add_option("--force-unit", options.force_unit, "Unit of the forces")
+      ->capture_default_str()
+      ->needs(&matrix);
+  verb.add_option("--zeros", options.zeros,
+                  "block: a row without load starts a block with its own zero; common: one zero")
+      ->check(CLI::IsMember({"block", "common"}))
+      ->capture_default_str()
+      ->needs(&matrix);
+  verb.add_flag("--diagonal", options.diagonal, "One gain per axis, no crosstalk")->needs(&matrix);
+}
+
 }  // namespace
 
 void add_calibrate(CLI::App& app, Work& work) {
@@ -123,24 +156,11 @@ void add_calibrate(CLI::App& app, Work& work) {
       "          tunnelrig calibrate --db my.db --points calibration.csv --propellers propellers.csv\n"
       "          tunnelrig calibrate --matrix cell3.csv --forces force_x,force_y,force_z --readings "
       "sensor_x,sensor_y,sensor_z --force-unit gf");
-  verb->add_option("--db", options->db, "Campaign file");
-  verb->add_option("--points", options->points, "CSV of calibration points, in place of those in the file");
-  verb->add_option("--propellers", options->propellers,
-                   "CSV of propeller tests, in place of those in the file");
-  verb->add_option("--loss", options->loss, "How much a point far from the line counts")
-      ->check(CLI::IsMember({"ordinary", "huber", "cauchy", "tukey"}))
-      ->capture_default_str();
+  CLI::Option* matrix = verb->add_option(
+      "--matrix", options->matrix, "CSV of loads on several axes: fit the crosstalk matrix, nothing else");
+  add_campaign_options(*verb, *options, *matrix);
   verb->add_flag("--keep-gross", options->keep_gross, "Do not leave gross errors out of the fit");
-  verb->add_option("--matrix", options->matrix,
-                   "CSV of loads on several axes: fit the crosstalk matrix, nothing else");
-  verb->add_option("--forces", options->forces, "Its force columns")->delimiter(',');
-  verb->add_option("--readings", options->readings, "Its reading columns, in the same order")->delimiter(',');
-  verb->add_option("--force-unit", options->force_unit, "Unit of the forces")->capture_default_str();
-  verb->add_option("--zeros", options->zeros,
-                   "block: a row without load starts a block with its own zero; common: one zero")
-      ->check(CLI::IsMember({"block", "common"}))
-      ->capture_default_str();
-  verb->add_flag("--diagonal", options->diagonal, "One gain per axis, no crosstalk");
+  add_matrix_options(*verb, *options, *matrix);
   verb->add_flag("--json", options->json, "Print as JSON");
   verb->callback([options, &work] { work = [options] { return run_calibrate(*options); }; });
 }

@@ -45,6 +45,22 @@ TEST(Crosstalk, AKnownMatrixComesBackAndSoDoTheForces) {
   }
 }
 
+TEST(Crosstalk, TheCoefficientsU95HoldsTheTruth) {
+  SyntheticTable truth = three_axes();
+  truth.noise = 0.01;
+  double held = 0, all = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    std::mt19937 engine(seed);
+    const CrosstalkFit fit = fit_crosstalk(truth.take(engine));
+    const Eigen::ArrayXXd off = (fit.matrix - truth.matrix).array().abs();
+    held += static_cast<double>((off <= fit.matrix_u95().array()).count());
+    all += static_cast<double>(off.size());
+    EXPECT_THAT(format_crosstalk(fit), HasSubstr("Its U95"));
+  }
+  EXPECT_GT(held / all, 0.9);
+  EXPECT_LT(held / all, 0.99);
+}
+
 TEST(Crosstalk, OneCommonZeroAndNoSignTermsAreChoices) {
   std::mt19937 engine(2);
   CrosstalkTable table = both_ways().take(engine);

@@ -210,6 +210,35 @@ TEST_F(BadInput, CalibrationThatSaysNothing) {
               HasSubstr("mine.csv: cell 1"));
 }
 
+TEST_F(BadInput, CalibrationOptionsThatWouldBeIgnored) {
+  write_text(folder / "m.csv", "fx,rx\n0,0\n1,2\n2,4.01\n3,6\n");
+  const std::string matrix = "calibrate --matrix m.csv --forces fx --readings rx ";
+  for (const char* option : {"--points m.csv", "--propellers m.csv", "--loss huber", "--db c.db"})
+    EXPECT_THAT(refusal_of(matrix + option, {"m.csv"}), HasSubstr("--matrix excludes --")) << option;
+  for (const char* option :
+       {"--forces fx", "--readings rx", "--force-unit gf", "--zeros common", "--diagonal"})
+    EXPECT_THAT(refusal_of(std::string("calibrate --db c.db ") + option, {"m.csv"}),
+                HasSubstr("requires --matrix"))
+        << option;
+  EXPECT_NE(test::run_program(folder.path(), matrix).code, 2);
+}
+
+TEST_F(BadInput, CalibrationMessagesNameTheFileThatWasGiven) {
+  campaign.write(folder / "source");
+  ASSERT_EQ(test::run_program(folder.path(), "import source --db c.db").code, 0);
+  write_text(folder / "mine.csv", "cell,applied_force_N,voltage_V\n");
+  EXPECT_THAT(refusal_of("calibrate --db c.db --points mine.csv", {"source", "c.db", "mine.csv"}),
+              HasSubstr("mine.csv: holds no calibration points"));
+  std::string grams = "cell,applied_force_N,voltage_V\n";
+  for (int cell = 1; cell <= 4; ++cell)
+    for (int i = 0; i < 5; ++i)
+      grams += fmt::format("{},{},{}\n", cell, 2000 + 500 * i, 1 + 0.1 * i + 0.001 * (i % 2));
+  write_text(folder / "mine.csv", grams);
+  EXPECT_THAT(test::run_program(folder.path(), "calibrate --db c.db --points mine.csv").out,
+              testing::AllOf(HasSubstr("mine.csv:2: column applied_force_N"),
+                             testing::Not(HasSubstr("calibration.csv"))));
+}
+
 /// Squares of such numbers are not finite: what was computed with them was not a number, or a crash.
 TEST_F(BadInput, NumbersThatNothingMeasures) {
   for (const auto& [column, row, value] :
