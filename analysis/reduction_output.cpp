@@ -163,6 +163,7 @@ MapInput map_input(const CampaignData& data, const Summary& summary, const std::
     input.locations.push_back(
         {location.label, *location.y_norm, *location.z_norm, location.c_t.mean, location.u_percent.mean});
     rows.push_back(static_cast<Eigen::Index>(l));
+    input.scatter_known = input.scatter_known && !std::isnan(location.c_t.standard_uncertainty);
   }
   input.c_t_covariance = summary.c_t_covariance(rows, rows);
   input.u_covariance = summary.u_covariance(rows, rows);

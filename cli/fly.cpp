@@ -37,7 +37,11 @@ struct NamedMap {
 NamedMap map_of(const FlyOptions& options) {
   if (options.map.empty())
     return {published_disturbance_map(), "published_field (simulated; no measured map was given)"};
-  return {read_disturbance_map(options.map), options.map};
+  NamedMap measured{read_disturbance_map(options.map), options.map};
+  if (!measured.map.delta_ct.u95_known() || !measured.map.uneven_thrust.u95_known())
+    warn(options.map +
+         ": the map's uncertainty is not known in places; no errors of the map are flown there");
+  return measured;
 }
 
 std::vector<std::string> controllers_of(const FlyOptions& options) {

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -53,14 +54,16 @@ void print(const WrittenMaps& written) {
   Table table(
       {"map", "lowest [%]", "highest [%]", "median U95 [%]", "leave-one-out rms [%]", "standardised"});
   const auto row = [&](const char* name, const MapLayer& layer, const FitSummary& fit) {
-    std::vector<double> u95 = layer.u95_percent;
+    std::vector<double> u95 = layer.u95_known() ? layer.u95_percent : std::vector<double>();
     std::nth_element(u95.begin(), u95.begin() + static_cast<std::ptrdiff_t>(u95.size() / 2), u95.end());
     const auto [low, high] = std::minmax_element(layer.value_percent.begin(), layer.value_percent.end());
     const auto& standardised = fit.leave_one_out.standardised_rms;
-    const double median = u95[u95.size() / 2], left_out = fit.leave_one_out.rms_percent;
-    const int decimals = decimals_for({*low, *high}, 2), of_errors = decimals_for({median, left_out}, 3);
+    const double left_out = fit.leave_one_out.rms_percent;
+    const std::optional<double> median = u95.empty() ? std::nullopt : std::optional(u95[u95.size() / 2]);
+    const int decimals = decimals_for({*low, *high}, 2),
+              of_errors = decimals_for({median.value_or(left_out), left_out}, 3);
     table.add({name, rounded_text(*low, decimals), rounded_text(*high, decimals),
-               rounded_text(median, of_errors), rounded_text(left_out, of_errors),
+               median ? rounded_text(*median, of_errors) : "-", rounded_text(left_out, of_errors),
                standardised ? fmt::format("{:.2f}", *standardised) : "-"});
   };
   row("change of C_T against OT", written.map.delta_ct, written.map.delta_ct_fit);
@@ -76,6 +79,15 @@ void check_nodes(int nodes) {
   throw InputError(fmt::format(
       "--nodes {}: an odd number from 3 to {}, so that a node is at OT and the maps fit into memory", nodes,
       kMostNodes));
+}
+
+WrittenMaps write_with_progress(const MapOptions& options, const TunnelMaps& maps,
+                                const std::string& provenance) {
+  ProgressBar bar("map");
+  return write_maps(options.out, maps,
+                    {.nodes = options.nodes, .provenance = provenance, .progress = [&](int done, int total) {
+                       bar.show(done, total, fmt::format("row {} of {}", done, total));
+                     }});
 }
 
 int run_map(const MapOptions& options) {
@@ -97,8 +109,7 @@ int run_map(const MapOptions& options) {
                                   {"calibration", data.certificate_id},
                                   {"model", reduction.model_name()},
                                   {"runs", reduction.runs.size()}};
-  const WrittenMaps written =
-      write_maps(options.out, maps, {.nodes = options.nodes, .provenance = provenance.dump()});
+  const WrittenMaps written = write_with_progress(options, maps, provenance.dump());
   keep_result(options.db, "map",
               nlohmann::json{{"calibration", data.certificate_id}, {"model", reduction.model.version}}.dump(),
               format_disturbance_map(written.map));
@@ -108,12 +119,11 @@ int run_map(const MapOptions& options) {
     if (run.problem || run.reason.starts_with("excluded"))
       warn(fmt::format("run {} is left out: {}", run.run, run.reason));
   }
-  if (std::ranges::any_of(summary.locations, [](const LocationSummary& location) {
-        return std::isnan(location.c_t.standard_uncertainty);
-      }))
-    warn(
-        "how far C_T and U scatter is not known (no location was repeated, and there are no raw data): "
-        "the maps' uncertainty is without it");
+  if (!maps.input.scatter_known)
+    warn(fmt::format(
+        "how far C_T and U scatter is not known (no location was repeated, and there are no raw data): {}",
+        written.map.delta_ct.u95_known() ? "the maps' uncertainty is without it"
+                                         : "nor is the maps' uncertainty, of which there is no picture"));
   if (written.warning) warn(*written.warning);
   if (options.json) {
     nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},

@@ -33,9 +33,16 @@ void write_page(const ReportOptions& options, const CampaignFile& file, const Re
 
 void write_all_figures(const ReportOptions& options, const CampaignFile& file,
                        const ReportSettings& settings) {
-  const WrittenFigures written = write_figures(
-      options.figures, file, settings,
-      {.format = figure_format(options.format), .width_mm = options.width_mm, .command = arguments()});
+  ProgressBar bar("figures");
+  const WrittenFigures written =
+      write_figures(options.figures, file, settings,
+                    {.format = figure_format(options.format),
+                     .width_mm = options.width_mm,
+                     .command = arguments(),
+                     .progress = [&bar](std::size_t done, std::size_t total) {
+                       bar.show(static_cast<double>(done), static_cast<double>(total),
+                                fmt::format("figure {} of {}", done, total));
+                     }});
   for (const AbsentFigure& figure : written.absent)
     fmt::print("without {}: {}\n", figure.figure, figure.reason);
   fmt::print("{} figures, {:g} mm wide{}, and captions.md in {}\n", written.files.size() - 1,

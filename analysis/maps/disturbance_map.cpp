@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include <nlohmann/json.hpp>
 
@@ -44,6 +45,11 @@ class Node {
   double number() const {
     if (!value_.is_number()) fail("must be a number");
     return value_.get<double>();  // JSON has no other than finite ones
+  }
+
+  /// NaN for null: not known.
+  double number_or_unknown() const {
+    return value_.is_null() ? std::numeric_limits<double>::quiet_NaN() : number();
   }
 
   double positive() const {
@@ -114,7 +120,7 @@ std::vector<double> parse_axis(const Node& node) {
   return axis;
 }
 
-std::vector<double> parse_matrix(const Node& node, const MapGrid& grid) {
+std::vector<double> parse_matrix(const Node& node, const MapGrid& grid, double (Node::*read)() const) {
   const std::vector<Node> rows = node.items();
   if (rows.size() != grid.z_norm.size()) {
     node.fail("has {} rows where z_norm has {} values", rows.size(), grid.z_norm.size());
@@ -126,14 +132,15 @@ std::vector<double> parse_matrix(const Node& node, const MapGrid& grid) {
     if (cells.size() != grid.y_norm.size()) {
       row.fail("has {} values where y_norm has {}", cells.size(), grid.y_norm.size());
     }
-    for (const Node& cell : cells) values.push_back(cell.number());
+    for (const Node& cell : cells) values.push_back((cell.*read)());
   }
   return values;
 }
 
 MapLayer parse_layer(const Node& document, const std::string& name, const MapGrid& grid) {
   const Node u95 = document[name + "_u95_percent"];
-  MapLayer layer{parse_matrix(document[name + "_percent"], grid), parse_matrix(u95, grid)};
+  MapLayer layer{parse_matrix(document[name + "_percent"], grid, &Node::number),
+                 parse_matrix(u95, grid, &Node::number_or_unknown)};
   if (std::any_of(layer.u95_percent.begin(), layer.u95_percent.end(), [](double u) { return u < 0; })) {
     u95.fail("must not hold a negative value");
   }
@@ -190,7 +197,7 @@ double parse_coordinate(const Node& node) {
 }
 
 double parse_u95(const Node& node) {
-  const double value = node.number();
+  const double value = node.number_or_unknown();
   if (value < 0) node.fail("must not be negative, is {}", value);
   return value;
 }
@@ -272,6 +279,10 @@ json to_json(const DisturbanceMap& map) {
 }
 
 }  // namespace
+
+bool MapLayer::u95_known() const {
+  return std::ranges::none_of(u95_percent, [](double u95) { return std::isnan(u95); });
+}
 
 std::string format_disturbance_map(const DisturbanceMap& map) {
   // One key a line, and one line for each element of an array of arrays or objects: readable, and diffs stay

@@ -31,10 +31,13 @@ struct MapGrid {
 /// One quantity on the grid, in per cent, row-major: node (row, column) is at MapGrid::index.
 struct MapLayer {
   std::vector<double> value_percent;
-  std::vector<double> u95_percent;  // half width of the 95 % interval; not negative
+  std::vector<double> u95_percent;  // half width of the 95 % interval; not negative; NaN: not known
+
+  bool u95_known() const;  // at every node
 };
 
-/// One measured location, as measured: U is not zero on the centre line here, ΔC_T is zero at OT.
+/// One measured location, as measured: U is not zero on the centre line here, ΔC_T is zero at OT. A u95 of
+/// NaN is not known.
 struct MeasuredLocation {
   std::string label;
   double y_norm = 0, z_norm = 0;

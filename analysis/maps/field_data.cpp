@@ -36,7 +36,7 @@ ThrustChange thrust_change(const MapInput& merged) {
 }
 
 FieldData folded(const MapInput& merged, Parity parity, Estimates estimates, const MatrixXd& excess) {
-  FieldData data{.parity = parity};
+  FieldData data{.parity = parity, .scatter_known = merged.scatter_known};
   VectorXd sign = VectorXd::Ones(estimates.values.size());
   for (Index i = 0; i < sign.size(); ++i) {
     const LocationEstimate& location = merged.locations[static_cast<std::size_t>(i)];
@@ -82,7 +82,7 @@ FieldData uneven_thrust_data(const MapInput& merged) {
 }
 
 FieldData without(const FieldData& data, Index left_out) {
-  FieldData rest{.parity = data.parity};
+  FieldData rest{.parity = data.parity, .scatter_known = data.scatter_known};
   std::vector<Index> kept;
   for (Index i = 0; i < data.size(); ++i) {
     if (i == left_out) continue;
@@ -111,6 +111,7 @@ double effective_dof(const std::vector<MatrixXd>& over_root_dof, const VectorXd&
 std::vector<MeasuredLocation> measured_locations(const MapInput& merged) {
   const Estimates change = thrust_change(merged).estimates;
   const auto u95 = [&](const MatrixXd& covariance, const std::vector<MatrixXd>& over_root_dof, Index i) {
+    if (!merged.scatter_known) return std::numeric_limits<double>::quiet_NaN();
     const double variance = std::max(0.0, covariance(i, i));
     return half_width_95(std::sqrt(variance),
                          effective_dof(over_root_dof, VectorXd::Unit(covariance.rows(), i), variance));

@@ -28,6 +28,7 @@ struct FieldData {
   /// the others. Not the identity for ΔC_T: OT's share of it reaches every other location.
   Eigen::MatrixXd excess;
   std::vector<Eigen::MatrixXd> over_root_dof;  // of each source of the measured covariance (Summary)
+  bool scatter_known = true;                   // of MapInput
 
   Eigen::Index size() const { return values.size(); }
 };
@@ -51,7 +52,8 @@ double thrust_coefficient_at_origin(const MapInput& merged);
 double effective_dof(const std::vector<Eigen::MatrixXd>& over_root_dof, const Eigen::VectorXd& weights,
                      double variance);
 
-/// The locations as measured, on the side of the tunnel where they were; u95 by Student's t.
+/// The locations as measured, on the side of the tunnel where they were; u95 by Student's t, NaN where the
+/// scatter is not known.
 std::vector<MeasuredLocation> measured_locations(const MapInput& merged);
 
 }  // namespace tunnelrig

@@ -7,7 +7,9 @@
 
 namespace tunnelrig {
 
-double FieldEstimate::u95() const { return half_width_95(standard_uncertainty, dof); }
+double FieldEstimate::u95() const {  // NaN where that of the field is
+  return half_width_95(standard_uncertainty, dof);
+}
 
 LeaveOneOutSummary summarize(const std::vector<LeftOut>& left_out) {
   if (left_out.empty()) return {};

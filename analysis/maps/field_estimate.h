@@ -18,7 +18,7 @@ namespace tunnelrig {
 /// The field at one point, per cent.
 struct FieldEstimate {
   double value = 0;
-  double standard_uncertainty = 0;
+  double standard_uncertainty = 0;                       // NaN: not known
   double dof = std::numeric_limits<double>::infinity();  // of it, Welch–Satterthwaite
 
   double u95() const;  // half width of the 95 % interval

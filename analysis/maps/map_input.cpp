@@ -144,6 +144,7 @@ MapInput merge_locations(const MapInput& input) {
                   .u_covariance = u.covariance,
                   .c_t_over_root_dof = c_t.over_root_dof,
                   .u_over_root_dof = u.over_root_dof,
+                  .scatter_known = input.scatter_known,
                   .geometry = input.geometry,
                   .c_t_open_space = input.c_t_open_space};
   for (const Index i : positions.kept) {

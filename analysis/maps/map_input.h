@@ -28,6 +28,8 @@ struct MapInput {
   Eigen::MatrixXd u_covariance;    // n × n, square percentage points
   /// Summary's of the same name, each n × n; none where the covariances are known exactly.
   std::vector<Eigen::MatrixXd> c_t_over_root_dof, u_over_root_dof;
+  /// Whether anything says how far C_T and U scatter; else the covariances are without it and bound nothing.
+  bool scatter_known = true;
   MapGeometry geometry;
   std::optional<double> c_t_open_space;
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/LU>
 
@@ -57,6 +58,8 @@ VectorXd ThinPlateSpline::basis(const TunnelPoint& point) const {
 FieldEstimate ThinPlateSpline::at(const TunnelPoint& point) const {
   require_inside(point);
   const VectorXd weights = (inverse_ * basis(point)).head(data_.size());  // of the measured values
+  // All that a spline's uncertainty is made of is the measured covariance.
+  if (!data_.scatter_known) return {weights.dot(data_.values), std::numeric_limits<double>::quiet_NaN()};
   const double variance = std::max(0.0, weights.dot(data_.covariance * weights));
   return {weights.dot(data_.values), std::sqrt(variance),
           effective_dof(data_.over_root_dof, weights, variance)};

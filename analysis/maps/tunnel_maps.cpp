@@ -68,7 +68,7 @@ MapGrid regular_grid(int nodes) {
   return {axis, axis};
 }
 
-MapLayer sample(const FittedField& field, const MapGrid& grid) {
+MapLayer sample(const FittedField& field, const MapGrid& grid, const std::function<void()>& after_row) {
   MapLayer layer;
   for (const double z_norm : grid.z_norm) {
     for (const double y_norm : grid.y_norm) {
@@ -76,16 +76,22 @@ MapLayer sample(const FittedField& field, const MapGrid& grid) {
       layer.value_percent.push_back(rounded(estimate.value));
       layer.u95_percent.push_back(rounded(estimate.u95()));
     }
+    if (after_row) after_row();
   }
   return layer;
 }
 
-DisturbanceMap disturbance_map(const TunnelMaps& maps, int nodes, const std::string& provenance) {
+DisturbanceMap disturbance_map(const TunnelMaps& maps, int nodes, const std::string& provenance,
+                               const MapProgress& progress) {
   const MapGrid grid = regular_grid(nodes);
+  int rows = 0;
+  const auto after_row = [&] {
+    if (progress) progress(++rows, 2 * nodes);
+  };
   return {.geometry = maps.input.geometry,
           .grid = grid,
-          .delta_ct = sample(maps.delta_ct, grid),
-          .uneven_thrust = sample(maps.uneven_thrust, grid),
+          .delta_ct = sample(maps.delta_ct, grid, after_row),
+          .uneven_thrust = sample(maps.uneven_thrust, grid, after_row),
           .locations = measured_locations(maps.input),
           .method = name_of(maps.settings.method),
           .coverage_factor = kNormalCoverage,

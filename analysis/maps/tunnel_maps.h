@@ -7,6 +7,7 @@
 #include "analysis/maps/map_input.h"
 #include "analysis/maps/thin_plate_spline.h"
 
+#include <functional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -54,9 +55,13 @@ constexpr bool is_grid_size(int nodes) { return nodes >= 3 && nodes <= kMostNode
 MapGrid regular_grid(int nodes);
 
 /// The field on a grid, rounded to 10⁻⁶ percentage points; never −0.
-MapLayer sample(const FittedField& field, const MapGrid& grid);
+MapLayer sample(const FittedField& field, const MapGrid& grid, const std::function<void()>& after_row = {});
+
+/// Of a grid's rows; 501 nodes a side take some 20 s.
+using MapProgress = std::function<void(int done, int total)>;
 
 /// What disturbance_map.json holds. `provenance` is the text of a JSON object.
-DisturbanceMap disturbance_map(const TunnelMaps& maps, int nodes, const std::string& provenance);
+DisturbanceMap disturbance_map(const TunnelMaps& maps, int nodes, const std::string& provenance,
+                               const MapProgress& progress = {});
 
 }  // namespace tunnelrig

@@ -6,7 +6,6 @@
 #include "analysis/maps/staging.h"
 #include "datasets/csv.h"
 
-#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -19,9 +18,11 @@ namespace {
 constexpr int kDrawingNodes = 121;
 constexpr int kMostLevels = 14, kMostUncertaintyLevels = 5;
 
-constexpr std::array kPictures = {"delta_ct.svg",          "delta_ct.png",         "delta_ct_u95.svg",
-                                  "delta_ct_u95.png",      "uneven_thrust.svg",    "uneven_thrust.png",
-                                  "uneven_thrust_u95.svg", "uneven_thrust_u95.png"};
+std::vector<std::string> pictures_of(const std::string& drawing, bool with_u95) {
+  std::vector<std::string> names = {drawing + ".svg", drawing + ".png"};
+  if (with_u95) names.insert(names.end(), {drawing + "_u95.svg", drawing + "_u95.png"});
+  return names;
+}
 
 /// One of the two fields as it is drawn, under the name of its files.
 struct Drawing {
@@ -35,8 +36,9 @@ std::string layer_csv(const MapGrid& grid, const MapLayer& layer) {
   for (std::size_t row = 0; row < grid.z_norm.size(); ++row) {
     for (std::size_t column = 0; column < grid.y_norm.size(); ++column) {
       const std::size_t i = grid.index(row, column);
+      const double u95 = layer.u95_percent[i];
       text += fmt::format("{},{},{},{}\n", grid.y_norm[column], grid.z_norm[row], layer.value_percent[i],
-                          layer.u95_percent[i]);
+                          std::isnan(u95) ? "" : fmt::format("{}", u95));
     }
   }
   return text;
@@ -53,7 +55,7 @@ std::string contours_csv(const std::vector<ContourLine>& lines) {
   return text;
 }
 
-/// Two pictures: the field and its uncertainty.
+/// Two pictures: the field and, where that is known, its uncertainty.
 std::string scripts(const Drawing& drawing, const MapGrid& grid, const TunnelMaps& maps,
                     const FitSummary& fit) {
   const bool process = maps.settings.method == MapMethod::kGaussianProcess;
@@ -71,6 +73,7 @@ std::string scripts(const Drawing& drawing, const MapGrid& grid, const TunnelMap
     picture.locations.push_back({location.y_norm, location.z_norm});
   }
   std::string script = gnuplot_script(picture, drawing.name);
+  if (!drawing.layer.u95_known()) return script;
   picture.title = fmt::format("Uncertainty of {}: half width of the 95 % interval", drawing.symbol);
   picture.colour_label = fmt::format("U_{{95}}({}) (%)", drawing.symbol);
   picture.diverging = false;
@@ -83,7 +86,7 @@ std::string scripts(const Drawing& drawing, const MapGrid& grid, const TunnelMap
 
 WrittenMaps write_maps(const std::filesystem::path& folder, const TunnelMaps& maps,
                        const WriteSettings& settings) {
-  WrittenMaps written{.map = disturbance_map(maps, settings.nodes, settings.provenance)};
+  WrittenMaps written{.map = disturbance_map(maps, settings.nodes, settings.provenance, settings.progress)};
   const DisturbanceMap& map = written.map;
   const MapGrid grid = regular_grid(kDrawingNodes);
   Drawing delta_ct{"delta_ct", "ΔC_T", "Change of thrust coefficient against O_T", "ΔC_T (%)"};
@@ -112,11 +115,18 @@ WrittenMaps write_maps(const std::filesystem::path& folder, const TunnelMaps& ma
         settings.gnuplot, staging.path(),
         scripts(delta_ct, grid, maps, map.delta_ct_fit) + scripts(uneven, grid, maps, map.uneven_thrust_fit));
   });
-  if (!written.warning) names.insert(names.end(), kPictures.begin(), kPictures.end());
-  written.files = staging.publish(names);
-  for (const char* picture : kPictures) {
-    if (written.warning) std::filesystem::remove(folder / picture);
+  std::vector<std::string> stale;
+  for (const Drawing* drawing : {&delta_ct, &uneven}) {
+    const bool with_u95 = drawing->layer.u95_known();
+    for (const std::string& picture : pictures_of(drawing->name, true)) stale.push_back(picture);
+    if (written.warning) continue;
+    for (const std::string& picture : pictures_of(drawing->name, with_u95)) {
+      names.push_back(picture);
+      std::erase(stale, picture);
+    }
   }
+  written.files = staging.publish(names);
+  for (const std::string& picture : stale) std::filesystem::remove(folder / picture);
   return written;
 }
 

@@ -15,6 +15,7 @@ struct WriteSettings {
   int nodes = 41;                   // of the grid, along each side; odd
   std::string provenance = "{}";    // text of a JSON object, for disturbance_map.json
   std::string gnuplot = "gnuplot";  // the program that draws
+  MapProgress progress = {};
 };
 
 struct WrittenMaps {
@@ -28,8 +29,9 @@ struct WrittenMaps {
 ///   uneven_thrust_contours.csv, delta_ct.svg, delta_ct_u95.svg, uneven_thrust.svg, uneven_thrust_u95.svg,
 ///   and the same as .png.
 /// Files of that name are replaced, all or none: everything is made in a scratch folder first. Without
-/// gnuplot there are no pictures, older ones of another map are removed, and the result says why. Throws
-/// InputError where the folder cannot be written or a setting is wrong.
+/// gnuplot there are no pictures, and the result says why; where the uncertainty is not known there is none
+/// of it. Older ones of another map are removed. Throws InputError where the folder cannot be written or a
+/// setting is wrong.
 WrittenMaps write_maps(const std::filesystem::path& folder, const TunnelMaps& maps,
                        const WriteSettings& settings = {});
 

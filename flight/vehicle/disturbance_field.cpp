@@ -121,7 +121,8 @@ DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, doub
   const auto fractions = [&](const MapLayer& layer, double error) {
     std::vector<double> f(layer.value_percent.size());
     for (std::size_t i = 0; i < f.size(); ++i) {
-      f[i] = 0.01 * (scale * layer.value_percent[i] + error * layer.u95_percent[i] / coverage);
+      const double u95 = layer.u95_percent[i];
+      f[i] = 0.01 * (scale * layer.value_percent[i] + (std::isnan(u95) ? 0 : error * u95 / coverage));
     }
     return f;
   };

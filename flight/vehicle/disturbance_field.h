@@ -28,7 +28,7 @@ class DisturbanceField {
   DisturbanceField() = default;
 
   /// `scale` multiplies both layers; the errors are in units of each layer's standard uncertainty, shared by
-  /// all nodes of it.
+  /// all nodes of it, and none where it is not known.
   explicit DisturbanceField(const DisturbanceMap& map, double scale = 1, double thrust_error = 0,
                             double uneven_error = 0);
 

@@ -47,6 +47,18 @@ TEST_F(MeasuredMap, IsFlownAndNamed) {
   EXPECT_THAT(other.error, testing::HasSubstr("extrapolated, in normalised coordinates"));
 }
 
+TEST_F(MeasuredMap, FliesWhereItsUncertaintyIsNotKnown) {
+  auto map = nlohmann::json::parse(read_text(folder / "maps/disturbance_map.json"));
+  for (const char* layer : {"delta_ct_u95_percent", "uneven_thrust_u95_percent"})
+    for (auto& row : map[layer])
+      for (auto& cell : row) cell = nullptr;
+  write_text(folder / "unknown.json", map.dump());
+  const auto result = run("fly --map unknown.json --controllers ibs --runs 2 --json f.json");
+  EXPECT_THAT(result.error, testing::HasSubstr("unknown.json: the map's uncertainty is not known"));
+  const auto flown = nlohmann::json::parse(read_text(folder / "f.json"));
+  EXPECT_LT(flown["controllers"][0]["max_y_mm"], 50);
+}
+
 TEST_F(MeasuredMap, ItsFlightsAreASectionOfTheReport) {
   run("fly --map maps/disturbance_map.json --scenario hover --controllers ibs,pid --runs 2 --out flights");
   const auto flights = nlohmann::json::parse(read_text(folder / "flights/flights.json"));

@@ -65,19 +65,17 @@ WrittenFigures write_figures(const std::filesystem::path& folder, const Campaign
     throw InputError::in(report.db, "there is no figure to draw: {}", figures.absent.front().reason);
   }
   const Staging staging(folder, "figures");
-  std::string script;
   std::vector<std::string> names;
-  for (const Figure& figure : figures.drawn) {
-    names.push_back(fmt::format("{}.{}", figure.name, name_of(settings.format)));
-    script +=
-        report::terminal(figure.sheet, settings.format, names.back()) + figure.script + "unset output\n";
-  }
   staging.write([&] {
-    if (const auto failed = run_gnuplot(settings.gnuplot, staging.path(), script))
-      throw InputError(fmt::format("figures cannot be drawn: {}", *failed));
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      const auto path = staging.path() / names[i];
-      write_text(path, report::completed(read_text(path), figures.drawn[i].sheet, settings.format));
+    for (const Figure& figure : figures.drawn) {
+      names.push_back(fmt::format("{}.{}", figure.name, name_of(settings.format)));
+      const std::string script =
+          report::terminal(figure.sheet, settings.format, names.back()) + figure.script + "unset output\n";
+      if (const auto failed = run_gnuplot(settings.gnuplot, staging.path(), script))
+        throw InputError(fmt::format("figures cannot be drawn: {}", *failed));
+      const auto path = staging.path() / names.back();
+      write_text(path, report::completed(read_text(path), figure.sheet, settings.format));
+      if (settings.progress) settings.progress(names.size(), figures.drawn.size());
     }
     write_text(staging.path() / kCaptions, captions(figures.drawn, report, settings));
   });

@@ -4,6 +4,7 @@
 #include "analysis/report/report_data.h"
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,7 @@ struct FigureSettings {
   double width_mm = 84;             // a column of most journals; fonts keep their size whatever the width
   std::string command;              // that makes the figures again, for captions.md
   std::string gnuplot = "gnuplot";  // the program that draws
+  std::function<void(std::size_t done, std::size_t total)> progress = {};  // of figures
 };
 
 /// A figure that a campaign has no data for, with the reason.

@@ -55,6 +55,22 @@ TEST(DisturbanceMap, ComesBackAsItWas) {
   EXPECT_EQ(back.provenance, map.provenance);
 }
 
+TEST(DisturbanceMap, WhatIsNotKnownIsNull) {
+  DisturbanceMap map = example();
+  map.delta_ct.u95_percent.assign(map.grid.nodes(), std::nan(""));
+  map.locations[3].delta_ct_u95_percent = std::nan("");
+  const std::string text = format_disturbance_map(map);
+  EXPECT_THAT(text, HasSubstr("\"delta_ct_u95_percent\": [\n [null,null,null,null,null]"));
+  const DisturbanceMap back = parse_disturbance_map(text, "m.json");
+  EXPECT_FALSE(back.delta_ct.u95_known());
+  EXPECT_TRUE(back.uneven_thrust.u95_known());
+  EXPECT_TRUE(std::isnan(back.locations[3].delta_ct_u95_percent));
+  EXPECT_EQ(format_disturbance_map(back), text);
+  EXPECT_THAT(refusal("\"delta_ct_percent\": [\n [", "\"delta_ct_percent\": [\n [null,"),
+              HasSubstr("delta_ct_percent"))
+      << "a value is always known";
+}
+
 TEST(DisturbanceMap, RowsAreHeightsAndColumnsGoAcross) {
   const DisturbanceMap map = example();
   const TunnelMaps maps = fit_maps(test::published_input(1));

@@ -6,6 +6,7 @@
 #include "support/temporary_folder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -50,6 +51,39 @@ TEST(WriteMaps, TablesAreAsDocumented) {
       }
     }
   }
+}
+
+/// Single runs without raw data: nothing says how far they scatter, which is no scatter of 0.
+TEST(WriteMaps, AnUncertaintyThatIsNotKnownIsEmpty) {
+  const test::TemporaryFolder folder;
+  MapInput input = test::exact_input();
+  input.c_t_covariance.setZero();
+  input.u_covariance.setZero();
+  input.scatter_known = false;
+  write_text(folder / "delta_ct_u95.png", "of another map");
+  const TunnelMaps maps = fit_maps(input, {.method = MapMethod::kThinPlateSpline});
+  const WrittenMaps written = write_maps(folder.path(), maps, {.nodes = 3});
+  EXPECT_THAT(read_text(folder / "delta_ct.csv"), HasSubstr("\n0,0,0,\n"));
+  EXPECT_FALSE(read_disturbance_map(folder / "disturbance_map.json").uneven_thrust.u95_known());
+  for (const MeasuredLocation& location : written.map.locations) {
+    EXPECT_TRUE(std::isnan(location.delta_ct_u95_percent));
+    EXPECT_TRUE(std::isnan(location.uneven_thrust_u95_percent));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "delta_ct_u95.png"));
+  EXPECT_EQ(std::filesystem::exists(folder / "delta_ct.png"), !written.warning);
+}
+
+TEST(WriteMaps, SaysHowFarItIs) {
+  const test::TemporaryFolder folder;
+  WriteSettings settings = without_pictures();
+  settings.nodes = 3;
+  std::vector<int> rows;
+  settings.progress = [&](int done, int total) {
+    rows.push_back(done);
+    EXPECT_EQ(total, 6);
+  };
+  write_maps(folder.path(), example(), settings);
+  EXPECT_THAT(rows, testing::ElementsAre(1, 2, 3, 4, 5, 6));
 }
 
 TEST(WriteMaps, TheGridIsTheCallers) {
