@@ -303,8 +303,7 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
     if (gross.size() > aside.room()) {  // many are no typing errors: the model is wrong
       said.push_back(
           fmt::format("{} {} are far off, more than are set aside ({} at most{}): what scatters like them "
-                      "hides the rest; "
-                      "look at suspect_rows, and leave out what is wrong",
+                      "hides the rest; look at suspect_rows, and leave out what is wrong",
                       gross.size(), observations.from_table ? "rows" : "runs", aside.most,
                       aside.rows.empty() ? "" : fmt::format(", and {} are", aside.rows.size())));
       break;

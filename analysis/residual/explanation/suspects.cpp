@@ -178,7 +178,7 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
 
 std::vector<std::string> blocks_apart(const Observations& observations) {
   constexpr double kFar = 20, kLeastFactor = 2;
-  constexpr std::size_t kFewestBlocks = 6, kFewestRows = 3;
+  constexpr std::size_t kBlocks = 6, kRows = 3;  // at least
   if (!observations.from_table || observations.blocks_are_rows || observations.groups_within_blocks ||
       !observations.multiplicative)
     return {};
@@ -193,7 +193,7 @@ std::vector<std::string> blocks_apart(const Observations& observations) {
   for (const auto& [block, rows] : blocks) {
     const VectorXd own = away(rows);
     const double middle = upper_median({own.begin(), own.end()});
-    if (blocks.size() < kFewestBlocks || rows.size() < kFewestRows || !(sigma > 0) ||
+    if (blocks.size() < kBlocks || rows.size() < kRows || !(sigma > 0) ||
         std::abs(middle) < std::max(kFar * sigma, std::log(kLeastFactor)))
       continue;
     result.push_back(fmt::format("{} of block {} is {:.3g} times what the others let expect: another unit?",

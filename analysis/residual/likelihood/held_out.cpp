@@ -72,7 +72,7 @@ class RunCovariance {
                                  });
   }
 
-  VectorXd std(const std::vector<Index>& of) const { return std_(of); }
+  VectorXd of_runs(const std::vector<Index>& runs) const { return std_(runs); }
 
  private:
   double of(std::size_t a, std::size_t b) const {
@@ -106,7 +106,7 @@ void own_baseline(const Observations& observations, const std::vector<int>& rows
       return x;
     };
     const MatrixXd of_fitted = covariance(fitted, fitted), shared = covariance(scored, fitted);
-    const VectorXd weight = covariance.std(fitted).cwiseInverse();
+    const VectorXd weight = covariance.of_runs(fitted).cwiseInverse();
     const MatrixXd x = weight.asDiagonal() * design(fitted), wanted = design(scored);
     if (x.rows() < x.cols()) continue;
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(x);
