@@ -104,10 +104,19 @@ MatrixXd residuals_of(const Observations& observations, const HeldOutErrors& err
       .log();
 }
 
-/// 1 − h: of each row's own error, what the fit to all has left.
-MatrixXd share_left(const Observations& observations, const HeldOutErrors& errors, const NullFit& variances) {
+/// Of each run, what all rotors have in common (of a table's row its response) beside its group's median.
+VectorXd from_group_medians(const Observations& observations) {
+  VectorXd away = observations.y.rowwise().mean();
+  for (const auto& [group, runs] : places_of_each(observations.group)) {
+    const VectorXd own = away(runs);
+    away(runs).array() -= upper_median({own.begin(), own.end()});
+  }
+  return away;
+}
+
+/// 1 − h: of each row's own error, of variance `sigma2`, what the fit to all has left.
+MatrixXd share_left(const Observations& observations, const HeldOutErrors& errors, const MatrixXd& sigma2) {
   constexpr double kLeast = 0.02;
-  const MatrixXd sigma2 = variance_of_runs(observations, variances, errors.rows);
   const MatrixXd unit = scale_of_residuals(observations, errors);
   return (2 - (errors.expected_std.array() / unit.array()).square() / sigma2.array()).cwiseMax(kLeast);
 }
@@ -139,7 +148,7 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
                                      const NullFit& variances, double dof) {
   const MatrixXd sigma2 = variance_of_runs(observations, variances, errors.rows);
   MatrixXd residual = residuals_of(observations, errors);
-  const MatrixXd left = share_left(observations, errors, variances);
+  const MatrixXd left = share_left(observations, errors, sigma2);
   VectorXd apart = distance_of_those_apart(observations, errors.rows, residual.rowwise().mean());
   residual.array() /= sigma2.array().sqrt();
   // A gross row under a rare condition may have been taken for scatter that goes with it, and others for
@@ -182,11 +191,7 @@ std::vector<std::string> blocks_apart(const Observations& observations) {
   if (!observations.from_table || observations.blocks_are_rows || observations.groups_within_blocks ||
       !observations.multiplicative)
     return {};
-  VectorXd away = observations.y.col(0);
-  for (const auto& [group, rows] : places_of_each(observations.group)) {
-    const VectorXd own = away(rows);
-    away(rows).array() -= upper_median({own.begin(), own.end()});
-  }
+  const VectorXd away = from_group_medians(observations);
   const double sigma = sigma_by_median(away.cwiseAbs());
   std::vector<std::string> result;
   const auto blocks = places_of_each(observations.block);
@@ -211,7 +216,8 @@ std::optional<SuspectRow> lone_row(const Observations& observations) {
   const double dof = degrees_of_freedom(observations, baseline, rows);
   if (dof < kFewest) return {};
   const HeldOutErrors fitted = score(observations, baseline, rows, rows);
-  const MatrixXd left = share_left(observations, fitted, baseline.variances);
+  const MatrixXd left =
+      share_left(observations, fitted, variance_of_runs(observations, baseline.variances, rows));
   const VectorXd apart = distance_of_those_apart(
       observations, rows, residuals_of(observations, fitted).cwiseQuotient(left).rowwise().mean());
   Index row = 0;
@@ -338,14 +344,9 @@ std::vector<IsolatedValue> values_beyond(const Observations& observations, doubl
   return result;
 }
 
-/// Of each run, what all rotors have in common beside its location's median, in σ by the median of all.
+/// Of each run, how far it is from its location's median, in σ by the median of all.
 VectorXd common_distance(const Observations& observations) {
-  const VectorXd common = observations.y.rowwise().mean();
-  VectorXd away = common;
-  for (const auto& [group, runs] : places_of_each(observations.group)) {
-    const VectorXd own = common(runs);
-    away(runs).array() -= upper_median({own.begin(), own.end()});
-  }
+  const VectorXd away = from_group_medians(observations);
   const double sigma = sigma_by_median(away.cwiseAbs());
   return sigma > 0 ? VectorXd(away / sigma) : VectorXd(VectorXd::Zero(away.size()));
 }

@@ -65,7 +65,6 @@ std::optional<std::size_t> of_other_sign(const std::vector<double>& values,
 namespace {
 
 constexpr std::size_t kNamedRows = 4;
-constexpr double kLoaded = 0.25;  // of the largest response
 
 bool is_thrust_with_speed(const ObservationTable& table, const ObservationChoice& choice) {
   return is_own_response(table.schema, choice) && table.schema.response.meaning == "thrust_N" &&
@@ -89,29 +88,32 @@ bool have_a_tare(const ObservationTable& table, const ObservationChoice& choice,
          (scatters_alike(table.schema, choice) || of_other_sign(thrust_N, group));
 }
 
-constexpr auto kAtRest = "the motor stood or its speed was not read (at most 5 % of what its group runs at)";
-
-/// Leaves out rows for which `is_out` holds, and says which. A motor at rest has no thrust.
+/// Leaves out rows for which `is_out` holds, and says which.
 template <class Rule>
 void leave_out(TableSource& source, const std::string& why, Observations& result, const Rule& is_out) {
   std::vector<std::string> out;
-  double most = 0, most_left_out = 0;
   std::erase_if(source.rows, [&](std::size_t r) {
-    const Observation& row = source.table.rows[r];
-    const bool goes = is_out(row);
-    if (goes) out.push_back(row.place);
-    double& larger = goes ? most_left_out : most;
-    larger = std::max(larger, std::abs(row.response));
+    const bool goes = is_out(source.table.rows[r]);
+    if (goes) out.push_back(source.table.rows[r].place);
     return goes;
   });
   if (out.empty()) return;
-  const bool loaded = why == kAtRest && most_left_out > kLoaded * most;
-  result.left_out.push_back(
-      fmt::format("{} {} left out: {}{}, {}", out.size(), out.size() == 1 ? "row" : "rows", why,
-                  loaded ? fmt::format("; {} is up to {:.3g} there: another unit?",
-                                       source.table.schema.response.column, most_left_out)
-                         : "",
-                  first_few(out, kNamedRows)));
+  result.left_out.push_back(fmt::format("{} {} left out: {}, {}", out.size(),
+                                        out.size() == 1 ? "row" : "rows", why, first_few(out, kNamedRows)));
+}
+
+/// A motor at rest has no thrust: what says otherwise, in words.
+template <class Rule>
+std::string load_at_rest(const TableSource& source, const Rule& is_at_rest) {
+  constexpr double kLoaded = 0.25;  // of the largest response
+  double most = 0, most_at_rest = 0;
+  for (const std::size_t r : source.rows) {
+    double& larger = is_at_rest(source.table.rows[r]) ? most_at_rest : most;
+    larger = std::max(larger, std::abs(source.table.rows[r].response));
+  }
+  return most_at_rest > kLoaded * most ? fmt::format("; {} is up to {:.3g} there: another unit?",
+                                                     source.table.schema.response.column, most_at_rest)
+                                       : "";
 }
 
 /// A speed that a few rows lack would be no condition at all.
@@ -145,10 +147,14 @@ TableSource used_rows(const ObservationTable& table, const ObservationChoice& ch
   TableSource source{table, std::vector<std::size_t>(table.rows.size())};
   std::iota(source.rows.begin(), source.rows.end(), 0U);
   const std::map<std::string, double> at_rest = resting_speeds_rpm(table);
-  leave_out(source, kAtRest, result, [&](const Observation& row) {
+  const auto rests = [&](const Observation& row) {
     const double rest_rpm = at_rest.at(row.group);
     return row.speed_rpm && rest_rpm > 0 && *row.speed_rpm <= rest_rpm;
-  });
+  };
+  leave_out(source,
+            "the motor stood or its speed was not read (at most 5 % of what its group runs at)" +
+                load_at_rest(source, rests),
+            result, rests);
   const bool diameter = table.schema.diameter_column || table.schema.diameter_m;
   const bool thrust_with_speed = is_thrust_with_speed(table, choice);
   source.as_c_t = thrust_with_speed && (diameter || have_a_tare(table, choice, source.rows));

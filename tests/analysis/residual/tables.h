@@ -34,6 +34,22 @@ struct TablesTest : testing::Test {
     return all;
   }
 
+  /// The time constant of a creep that each cell has in its own measure: found, with an interval that holds
+  /// the truth. Columns cell, day, t and u.
+  static void find_time_constant(const std::string& csv, double truth_s, double within_s,
+                                 ParameterEstimate& tau) {
+    const Explanation e = explained(
+        observed(csv,
+                 "groups = [\"cell\"]\nblocks = \"day\"\n[response]\ncolumn = \"u\"\nunit = \"N\"\n"
+                 "[[covariates]]\ncolumn = \"t\"\nunit = \"s\"\nmeaning = \"time_since_motor_start_s\"\n"));
+    ASSERT_EQ(names(e), "creep ");
+    ASSERT_TRUE(e.adopted[0].term.per_group);
+    tau = e.adopted[0].parameters[1];
+    EXPECT_NEAR(tau.value, truth_s, within_s);
+    EXPECT_LT(tau.low, truth_s);
+    EXPECT_GT(tau.high, truth_s);
+  }
+
   /// Thrust by voltage, 96 rows in 12 blocks of 0.3 %; `wrong` multiplies the row on line 24.
   Observations thrusts(double wrong) {
     std::string csv = "b,V,y\n";
