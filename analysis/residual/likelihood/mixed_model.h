@@ -7,7 +7,7 @@
 // have contrasts that scatter unlike each other); the runs' means and each cosine coefficient of their
 // course, common or difference, make a stratum with a run variance σ² and a session variance a σ² of its own.
 // A run's mean may be correlated with that of the run before it by φ, and scatter d times as much as most: V
-// = σ² (DΦD + a 11ᵀ) in each session, Φ_ij = φ^|i − j|, D = diag(d). docs/closed-loop.md has the equations.
+// = σ² (DΦD + a 11ᵀ) in each session, Φ_ij = φ^|i − j|, D = diag(d). docs/closed-loop-method.md has the equations.
 #pragma once
 
 #include "analysis/residual/likelihood/terms.h"

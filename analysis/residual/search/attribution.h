@@ -1,4 +1,4 @@
-// From residuals to named effects: the search, on the runs that are not sealed. docs/closed-loop.md has the
+// From residuals to named effects: the search, on the runs that are not sealed. docs/closed-loop-method.md has the
 // protocol.
 #pragma once
 
