@@ -7,7 +7,8 @@
 // have contrasts that scatter unlike each other); the runs' means and each cosine coefficient of their
 // course, common or difference, make a stratum with a run variance σ² and a session variance a σ² of its own.
 // A run's mean may be correlated with that of the run before it by φ, and scatter d times as much as most: V
-// = σ² (DΦD + a 11ᵀ) in each session, Φ_ij = φ^|i − j|, D = diag(d). docs/closed-loop-method.md has the equations.
+// = σ² (DΦD + a 11ᵀ) in each session, Φ_ij = φ^|i − j|, D = diag(d). docs/closed-loop-method.md has the
+// equations.
 #pragma once
 
 #include "analysis/residual/likelihood/terms.h"
@@ -105,13 +106,16 @@ class MixedModel {
                    const Eigen::MatrixXd& sizes = {}) const;
 
   /// How far each run is, over σ and its own scatter, from what the model with `columns` says of it without
-  /// that run (over 1 − h); runs × modes, rms 1; of each stratum, empty of a course. `residual`: what they
-  /// leave. `sigma`: of each stratum. `as_they_are`: runs that are as far as their residual.
+  /// that run (over 1 − h); runs × modes, rms 1; of each stratum, empty of a course. Where they take up
+  /// nearly all of a run, nobody else says what they do there: it is as far as from the baseline. `sigma`: of
+  /// each stratum. `as_they_are`: runs that are as far as their residual.
   std::vector<Eigen::MatrixXd> sizes_left(const std::vector<std::size_t>& ratio,
-                                          const std::vector<double>& sigma, const Components& residual,
+                                          const std::vector<double>& sigma, const Components& y,
                                           const std::vector<Components>& columns,
-                                          const std::vector<Eigen::Index>& as_they_are,
-                                          std::mt19937_64& random) const;
+                                          const Eigen::VectorXd& amplitude,
+                                          const std::vector<Eigen::Index>& as_they_are) const;
+  /// h of each run: the part of its whitened response that the baseline takes up; 0 of a course.
+  Eigen::VectorXd baseline_leverage(std::size_t stratum, std::size_t ratio) const;
   /// `sets` of them, of unit σ and one ratio.
   Stacked simulate_unit(std::size_t stratum, std::size_t ratio, std::size_t sets, double run_correlation,
                         std::mt19937_64& random) const;

@@ -3,8 +3,6 @@
 
 #include <cmath>
 
-#include <Eigen/QR>
-
 namespace tunnelrig {
 
 using Eigen::Index;
@@ -34,42 +32,6 @@ Stacked MixedModel::simulate(std::size_t stratum, const std::vector<double>& sig
       }
     }
     result.col(i) *= sigma[static_cast<std::size_t>(i)];
-  }
-  return result;
-}
-
-std::vector<MatrixXd> MixedModel::sizes_left(const std::vector<std::size_t>& ratio,
-                                             const std::vector<double>& sigma, const Components& residual,
-                                             const std::vector<Components>& columns,
-                                             const std::vector<Index>& as_they_are,
-                                             std::mt19937_64& random) const {
-  constexpr std::size_t kSets = 200;
-  constexpr double kLeastLeft = 0.05;  // of the only run at a location, nothing
-  std::vector<const Components*> items;
-  for (const Components& column : columns) items.push_back(&column);
-  std::vector<Stacked> projected(strata_.size());
-  MatrixXd information = MatrixXd::Zero(static_cast<Index>(items.size()), static_cast<Index>(items.size()));
-  for (std::size_t s = 0; s < strata_.size() && !items.empty(); ++s) {
-    projected[s] = stack(s, items) / sigma[s];
-    project(s, ratio[s], projected[s]);
-    information += projected[s].transpose() * projected[s];
-  }
-  const MatrixXd covariance = information.completeOrthogonalDecomposition().pseudoInverse();
-  std::vector<MatrixXd> result(strata_.size());
-  for (std::size_t s = 0; s < strata_.size(); ++s) {
-    if (!strata_[s].means()) continue;
-    Stacked left = stack(s, {&residual}),
-            alike = simulate_unit(s, ratio[s], kSets, run_correlation(s), random);
-    project(s, ratio[s], left);
-    project(s, ratio[s], alike);
-    Eigen::VectorXd own = alike.array().square().rowwise().mean();  // 1 − h
-    if (!items.empty()) own -= (projected[s] * covariance).cwiseProduct(projected[s]).rowwise().sum();
-    for (const Index run : as_they_are)
-      for (Index mode = 0; mode < strata_[s].modes; ++mode)
-        own(run + mode * static_cast<Index>(rows_.size())) = 1;
-    const Eigen::VectorXd size = left.col(0).cwiseAbs().cwiseQuotient(own.cwiseMax(kLeastLeft));
-    result[s] = Eigen::Map<const MatrixXd>(size.data(), static_cast<Index>(rows_.size()), strata_[s].modes);
-    result[s] *= std::sqrt(static_cast<double>(size.size())) / size.norm();
   }
   return result;
 }

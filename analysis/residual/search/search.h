@@ -152,8 +152,8 @@ class Search {
   /// the runs is none. Nothing of few runs, whose signs make too few data sets.
   std::vector<Eigen::MatrixXd> sizes_beside(const JointFit& fit, const Candidate& candidate,
                                             const CandidateFit& found) const;
-  /// Whether a candidate has most of its evidence from the other runs.
-  bool is_found_without(const std::vector<Eigen::Index>& runs, const JointFit& fit,
+  /// Whether a candidate has most of its evidence from the runs but for these (places in `rows_`).
+  bool is_found_without(const std::vector<Eigen::Index>& places, const JointFit& fit,
                         const Candidate& candidate, const CandidateFit& found) const;
   /// What chance makes of a scan on top of a fit, whose best candidate counts as no scatter. Refers to
   /// `scan`.

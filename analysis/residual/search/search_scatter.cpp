@@ -39,11 +39,10 @@ std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Can
   constexpr Eigen::Index kFewest = 20;
   constexpr std::size_t kMostFar = 3;
   if (mixed_->dof(0) < kFewest) return {};
-  const Components residual = without(difference(y_, fit.linear.offset), candidate.columns, found.amplitude);
+  const Components y = difference(y_, fit.linear.offset);
   const auto sizes = [&](const std::vector<Eigen::Index>& as_they_are) {
-    std::mt19937_64 random(settings_.seed * 1000003 + 6000);
-    return mixed_->sizes_left(fit.variances.ratio, fit.variances.sigma, residual, candidate.columns,
-                              as_they_are, random);
+    return mixed_->sizes_left(fit.variances.ratio, fit.variances.sigma, y, candidate.columns, found.amplitude,
+                              as_they_are);
   };
   auto result = sizes({});
   // Where a condition has one value far out, a curve that is only nearly right is far off without that run.
@@ -51,7 +50,7 @@ std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Can
   return far.empty() || !is_found_without(far, fit, candidate, found) ? result : sizes(far);
 }
 
-bool Search::is_found_without(const std::vector<Eigen::Index>& runs, const JointFit& fit,
+bool Search::is_found_without(const std::vector<Eigen::Index>& places, const JointFit& fit,
                               const Candidate& candidate, const CandidateFit& found) const {
   constexpr double kMost = 0.7;
   const Eigen::Index channels = y_[0].cols();
@@ -59,10 +58,10 @@ bool Search::is_found_without(const std::vector<Eigen::Index>& runs, const Joint
   for (const Eigen::MatrixXd& component : y_)
     nothing.push_back(Eigen::MatrixXd::Zero(component.rows(), component.cols()));
   std::vector<Components> columns = fit.linear.columns;
-  for (const Eigen::Index run : runs)
+  for (const Eigen::Index place : places)
     for (Eigen::Index channel = 0; channel < channels; ++channel) {
       columns.push_back(nothing);
-      columns.back()[0](run, channel) = 1;
+      columns.back()[0](rows_[static_cast<std::size_t>(place)], channel) = 1;
     }
   const CandidateScan scan(*mixed_, columns, {candidate});
   return scan.fit(difference(y_, fit.linear.offset))[0].evidence > kMost * found.evidence;

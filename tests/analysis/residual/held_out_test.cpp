@@ -183,6 +183,33 @@ TEST_P(HeldOut, ExpectedScatterOfAGroupsOwnBaselineKnowsItsNeighbours) {
   expect_near_1(of_table);
 }
 
+/// So is what runs of one session share, where a group is met in several of them.
+TEST_P(HeldOut, ExpectedScatterOfAGroupsOwnBaselineKnowsItsSessions) {
+  std::mt19937_64 random(test::seed() + 10);
+  const std::size_t ratio = 6;  // sessions scatter more than runs
+  constexpr int kTables = 300, kGroups = 9;
+  VectorXd of_table(kTables);
+  for (int i = 0; i < kTables; ++i) {
+    Observations o = test::simulate({.runs_of_block = std::vector<int>(12, 9),
+                                     .groups = 1,
+                                     .channels = GetParam(),
+                                     .session_ratio = kRatios[ratio]},
+                                    random);
+    Split split;
+    o.group_name.clear();
+    for (int group = 0; group < kGroups; ++group) o.group_name.push_back(std::to_string(group));
+    for (const int row : o.all_rows()) {  // each session has a run of every group
+      o.group[static_cast<std::size_t>(row)] = row % kGroups;
+      o.held_out.push_back(row % kGroups % 3 == 1);
+      (o.held_out.back() ? split.test : split.fit).push_back(row);
+    }
+    const HeldOutErrors errors =
+        predict_held_out(o, {o.y}, {}, known_variances(o, 0.002, ratio), split.fit, split.test);
+    of_table(i) = mean_square_over_expected(errors);
+  }
+  expect_near_1(of_table);
+}
+
 /// And its errors have those of the amplitudes, of which the group's own constant takes up none that vary in
 /// it.
 TEST_P(HeldOut, ExpectedScatterOfAGroupsOwnBaselineHasTheAmplitudes) {

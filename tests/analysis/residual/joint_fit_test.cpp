@@ -103,6 +103,20 @@ TEST_F(JointFitTest, KeepsBoundsAndSaysSo) {
   EXPECT_THAT(fit.at_bound, testing::ElementsAre("air_pressure exponent"));
 }
 
+/// What has come to a bound is not fitted there: its amplitude is known as well as with a given shape.
+TEST_F(JointFitTest, AShapeAtItsBoundHasNoColumn) {
+  Observations o = observations(1, 0, 2e-4);
+  test::add_effect(o, "creep", {0.05, 60});
+  MeanModel model{{term("creep", {0.05, 60})}, {}};
+  const auto columns = [&](Shapes shapes) {
+    return linearise(o, model, predict_forces(o, model, o.all_rows()), shapes).columns.size();
+  };
+  EXPECT_EQ(columns(Shapes::kWithinBounds), 2u);
+  model.terms[0].parameters[1] = test::effect_named("creep").parameters[1].upper;
+  EXPECT_EQ(columns(Shapes::kWithinBounds), 1u);
+  EXPECT_EQ(columns(Shapes::kAll), 2u);
+}
+
 TEST_F(JointFitTest, TheorysCoefficientStays) {
   Observations o = observations(1, 0, 2e-4);
   test::add_effect(o, "air_pressure", {1.4});

@@ -258,6 +258,24 @@ TEST(RunCorrelation, IsFoundWhereItIsAndNowhereElse) {
   }
 }
 
+/// The leverage is the diagonal of the baseline's hat matrix, in whitened responses.
+TEST(MixedModel, LeverageIsThatOfDenseAlgebra) {
+  std::mt19937_64 random{test::seed()};
+  for (const double correlation : {0.0, 0.6})
+    for (const std::size_t ratio : {0U, 4U}) {
+      Observations o = test::simulate({.runs_of_block = {5, 1, 7, 6}, .groups = 4}, random);
+      o.scatter.run_correlation = {correlation, correlation};
+      o.scatter.runs = VectorXd::LinSpaced(o.rows(), 0.7, 1.4);
+      const auto rows = o.all_rows();
+      MatrixXd x = test::dense_baseline(o, rows, rows);
+      whiten(without_numbers(places_of_each(o.block, rows)), o.scatter.of_runs(rows), kRatios[ratio],
+             correlation, x);
+      const MatrixXd hat = x * x.completeOrthogonalDecomposition().pseudoInverse();
+      EXPECT_LT((MixedModel(o, rows).baseline_leverage(0, ratio) - hat.diagonal()).norm(), 1e-10)
+          << correlation << ' ' << kRatios[ratio];
+    }
+}
+
 /// As far as a run is from what the others say of it: alike for all of a block, however they resemble each
 /// other.
 TEST(MixedModel, SizesThatAreLeftAreAlikeWhereRunsAre) {
@@ -271,7 +289,7 @@ TEST(MixedModel, SizesThatAreLeftAreAlikeWhereRunsAre) {
     for (int set = 0; set < kSets; ++set) {
       const Components residual = {MatrixXd(model.simulate_unit(0, 0, 1, correlation, random))};
       const Components candidate = {MatrixXd(model.simulate_unit(0, 0, 1, 0, random))};
-      const MatrixXd sizes = model.sizes_left({0}, {1.0}, residual, {candidate}, {}, random)[0];
+      const MatrixXd sizes = model.sizes_left({0}, {1.0}, residual, {candidate}, VectorXd::Zero(1), {})[0];
       for (Eigen::Index run = 0; run < sizes.rows(); ++run)
         (run % kRuns == 0 ? first : others) += std::pow(sizes(run, 0), 2);
     }

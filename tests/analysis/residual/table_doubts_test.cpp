@@ -1,0 +1,124 @@
+// What of a table is doubtful is said: blocks that are wrong, motors that stand under load, tares beside two
+// directions, errors beyond their floor.
+#include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/tables.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+namespace tunnelrig {
+namespace {
+
+using test::explained;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+
+struct TableDoubts : test::TablesTest {
+  static constexpr const char* kTorques =
+      "blocks = \"set\"\n[response]\ncolumn = \"y\"\nunit = \"N m\"\n"
+      "[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\nmeaning = \"air_temperature_C\"\n";
+  static constexpr const char* kThrustAndSpeed =
+      "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+      "[speed]\ncolumn = \"N\"\nunit = \"rpm\"\n";
+
+  /// 20 sets of 8 torques; the first `wrong` of set 6 are a tenth too large.
+  std::string torques(int wrong) {
+    std::string csv = "set,T,y\n";
+    for (int r = 0; r < 160; ++r)
+      csv += fmt::format("{},{},{}\n", r / 8, 20 + scatter(random),
+                         (r / 8 == 6 && r % 8 < wrong ? 1.1 : 1) * 3 * (1 + 0.002 * scatter(random)));
+    return csv;
+  }
+};
+
+/// What is left of such a block is judged as if it were right.
+TEST_F(TableDoubts, ABlockOfWhichMostIsSetAside) {
+  EXPECT_THAT(
+      explained(observed(torques(6), kTorques)).warnings,
+      Contains(HasSubstr("6 of the 8 rows of block 6 are set aside, and the rest is likely as wrong")));
+  const Explanation few = explained(observed(torques(2), kTorques));
+  EXPECT_EQ(few.suspect_rows.size(), 2u);
+  EXPECT_THAT(few.warnings, Not(Contains(HasSubstr("the rest is likely as wrong"))));
+}
+
+/// A speed in thousands of rev/min stands beside others in rev/min.
+TEST_F(TableDoubts, AMotorThatStandsUnderLoad) {
+  std::string csv = "b,N,y\n";
+  for (int r = 0; r < 96; ++r) {
+    const double rpm = 3000 + 4000 * even(random);
+    csv += fmt::format("{},{},{}\n", r / 8, r % 8 == 3 ? rpm / 1000 : rpm,
+                       6 * std::pow(rpm / 5000, 2) * (1 + 0.003 * scatter(random)));
+  }
+  EXPECT_THAT(observed(csv, kThrustAndSpeed).left_out,
+              Contains(AllOf(HasSubstr("12 rows left out: the motor stood"), HasSubstr("another unit?"))));
+  csv = "b,N,y\n";
+  for (int r = 0; r < 96; ++r) {
+    const double rpm = r % 8 == 3 ? 0 : 3000 + 4000 * even(random);
+    csv += fmt::format("{},{},{}\n", r / 8, rpm, 6 * std::pow(rpm / 5000, 2) + 0.01 * scatter(random));
+  }
+  EXPECT_THAT(observed(csv, kThrustAndSpeed).left_out, Contains(Not(HasSubstr("another unit?"))));
+}
+
+/// The constant is held against a C_T of either direction: their difference is no tare.
+TEST_F(TableDoubts, ATareBesideThrustsOfBothDirections) {
+  for (const double tare_N : {0.0, -0.4}) {
+    std::string csv = "b,N,y\n";
+    for (int r = 0; r < 96; ++r) {
+      const double rpm = 1000 + 6000 * even(random), full_N = 6 * std::pow(rpm / 5000, 2);
+      csv += fmt::format("{},{},{}\n", r / 8, rpm,
+                         (r % 2 == 0 ? full_N : -0.75 * full_N) + tare_N + 0.02 * scatter(random));
+    }
+    const Explanation e = explained(observed(csv, kThrustAndSpeed));
+    EXPECT_THAT(e.warnings, Contains(HasSubstr("thrusts of both directions")));
+    const auto of_tare = Contains(HasSubstr("a constant beside C_T, -0.4"));
+    if (tare_N == 0)
+      EXPECT_THAT(e.warnings, Not(Contains(HasSubstr("a constant beside C_T")))) << explanation_text(e);
+    else
+      EXPECT_THAT(e.warnings, of_tare) << explanation_text(e);
+  }
+}
+
+/// A floor of seven residuals is known to a third: an error above it is mostly chance.
+TEST_F(TableDoubts, AFewRowsTellAFloorAsWellAsTheyCan) {
+  constexpr int kTables = 80;
+  int beyond = 0;
+  for (int i = 0; i < kTables; ++i) {
+    std::string csv = "T,y\n";
+    for (int r = 0; r < 12; ++r)
+      csv += fmt::format("{},{}\n", 20 + scatter(random), 3 * (1 + 0.01 * scatter(random)));
+    const Explanation e = explained(
+        observed(csv,
+                 "blocks = \"rows\"\n[response]\ncolumn = \"y\"\nunit = \"N m\"\n"
+                 "[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\nmeaning = \"air_temperature_C\"\n"));
+    beyond += e.sealed.beyond_floor ? 1 : 0;
+  }
+  EXPECT_LE(beyond, 5) << "binomial (80, 0.02): beyond 5 in 0.7 % of cases";
+}
+
+/// One gust in which one row is far off tells nothing of what wind does, whichever rows are held out.
+TEST_F(TableDoubts, OneRunFarOutOnACondition) {
+  constexpr int kTables = 12;
+  for (const bool held_out_first : {true, false}) {
+    int found = 0;
+    for (int i = 0; i < kTables; ++i) {
+      std::string csv = "set,w,y\n";
+      for (int r = 0; r < 96; ++r) {
+        const bool gust = r == 60;
+        csv += fmt::format("{},{},{}\n", r / 8, gust ? 9 : even(random),
+                           3 * (1 + 0.01 * (gust ? 8 : scatter(random))));
+      }
+      const Explanation e = explained(observed(csv, "blocks = \"set\"\nhold_out = \"" +
+                                                        std::string(held_out_first ? "set < 3" : "set > 8") +
+                                                        "\"\n[response]\ncolumn = \"y\"\nunit = \"N m\"\n"
+                                                        "[[covariates]]\ncolumn = \"w\"\nunit = \"1\"\n"));
+      found += e.adopted.empty() && e.unknown.empty() ? 0 : 1;
+    }
+    EXPECT_LE(found, 2) << (held_out_first ? "the first are held out" : "the last are held out");
+  }
+}
+
+}  // namespace
+}  // namespace tunnelrig
