@@ -79,6 +79,8 @@ enum class EffectOrigin {
   kSpeedSquared,    // the law by which forces go with the rotor's speed
   kCharacteristic,  // what a cell makes of the force alone
   kOffset,          // a constant beside the force
+  kSupply,          // what the motor is driven with, which acts by the speed
+  kMotor,           // what becomes of a motor while it runs
 };
 
 struct Effect {

@@ -26,6 +26,7 @@ std::vector<Effect> motor_warm_up() {
                      {"time_constant", "s", 0.5, 7200, ParameterRole::kShape, time_constants_s(), {}}},
       .covariates = {"time_since_motor_start_s"},
       .scope = EffectScope::kRotor,
+      .origin = EffectOrigin::kMotor,
       .sign_rule = "thrust falls towards its settled value",
       .force_N = {},
       .jet_N = {},

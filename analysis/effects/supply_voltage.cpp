@@ -25,6 +25,7 @@ std::vector<Effect> supply_voltage() {
       .parameters = {{"exponent", "1", 0, 4}},
       .covariates = {"supply_voltage_V"},
       .scope = EffectScope::kShared,
+      .origin = EffectOrigin::kSupply,
       .sign_rule = "thrust grows with voltage",
       .force_N = {},
       .jet_N = {},

@@ -20,10 +20,12 @@ void report_adopted(const Observations& observations, const Attribution& found, 
                           .at_bound = at_bound(whole, accepted.term),
                           .confounded_with = {},
                           .separating_run = {}};
-    if (adopted.term.per_group)
-      adopted.parameters[0] =
-          summary_of_groups(adopted.term.effect->parameters[0],
-                            estimate_by_group(observations, whole.model, t, whole.variances, rows));
+    if (adopted.term.per_group) {
+      const EffectParameter& amplitude = adopted.term.effect->parameters[0];
+      const auto groups = estimate_by_group(observations, whole.model, t, whole.variances, rows);
+      adopted.parameters[0] = summary_of_groups(amplitude, groups);
+      adopted.at_bound = !are_within_bounds(groups, amplitude);  // what joined it later may have moved them
+    }
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k)
       adopted.parameters[k].unit = unit_of(observations, adopted.term.effect->parameters[k]);
     for (const Ranked& rival : accepted.confounded)

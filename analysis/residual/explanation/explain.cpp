@@ -252,6 +252,8 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
 std::string refutation(const AdoptedEffect& adopted, const Observations& observations) {
   if (adopted.term.effect->theory_only || adopted.term.at_theory) return "";
   const ParameterEstimate& amplitude = adopted.parameters[0];
+  if (adopted.at_bound && adopted.term.per_group)
+    return fmt::format("its {} is outside the physical bounds in too many groups", amplitude.name);
   if (adopted.at_bound) return fmt::format("its {} is at its physical bound", amplitude.name);
   if (adopted.anywhere) return "when it happened is not known within half of the runs";
   for (std::size_t k = 1; k < adopted.parameters.size(); ++k) {

@@ -54,7 +54,7 @@ std::optional<Effect> bounded_as_here(const Effect& effect, const Observations& 
   bool differs = false;
   for (EffectParameter& parameter : own.parameters) {
     const bool in_volts = parameter.in_volts() && observations.unit != "V";
-    const bool per_newton = parameter.per_newton() && observations.unit != "N";
+    const bool per_newton = parameter.per_newton();
     if (in_volts) bound_by(effect.origin == EffectOrigin::kOffset ? most_read : kNoBound, parameter);
     if (per_newton)
       bound_by(kMostBent / (observations.value.maxCoeff() - observations.value.minCoeff()), parameter);

@@ -246,21 +246,18 @@ MatrixXd on_baseline(const Observations& observations, const MatrixXd& residual,
   return predicted;
 }
 
-/// What each term acts on, `own` being what it adds. Of logarithms, in which factors stand side by side, all
-/// the rest; of forces what the terms before it have made, or a product of two would be counted with both.
+/// What each term acts on, `own` being what it adds (of logarithms: multiplies by): what the terms before it
+/// have made, or a product of two would be counted with both.
 std::vector<MatrixXd> acted_on(const Observations& observations, const std::vector<Term>& terms,
                                const MatrixXd& predicted, const std::vector<MatrixXd>& own) {
-  std::vector<MatrixXd> result;
-  if (observations.multiplicative) {
-    for (const MatrixXd& each : own) result.emplace_back(predicted.array() / each.array().exp());
-    return result;
-  }
-  result.resize(terms.size());
-  MatrixXd made = predicted;
-  for (const MatrixXd& each : own) made -= each;
+  std::vector<MatrixXd> result(terms.size());
+  const bool of_logarithms = observations.multiplicative;
+  Eigen::ArrayXXd made = predicted;
+  if (of_logarithms) made = made.log().eval();
+  for (const MatrixXd& each : own) made -= each.array();
   for (const std::size_t t : order_of_action(terms)) {
-    result[t] = made;
-    made += own[t];
+    result[t] = of_logarithms ? MatrixXd(made.exp()) : MatrixXd(made);
+    made += own[t].array();
   }
   return result;
 }

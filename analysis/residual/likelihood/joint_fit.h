@@ -30,8 +30,7 @@ struct Forces {
   /// its zero, which is no force. Effects of the run before are in what is fitted but not in here: it is
   /// loads that a cell remembers, not what it made of them.
   Eigen::MatrixXd predicted;
-  /// By term: what it acts on, the same without what the term itself adds; where effects add, without what
-  /// those add that act after it.
+  /// By term: what it acts on, which is what those have made that act before it.
   std::vector<Eigen::MatrixXd> acted_on;
 };
 Forces predict_forces(const Observations& observations, const MeanModel& model, const std::vector<int>& rows);

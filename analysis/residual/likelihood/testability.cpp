@@ -127,6 +127,12 @@ std::string against_origin(const Effect& effect, const Observations& observation
         return is_made_c_t(observations) ? "" : "a coefficient is no force that a cell has read";
       if (number) return "a number is no force that a cell has read";
       return power ? kPower : "";
+    case EffectOrigin::kSupply:
+      return observations.from_table && observations.coefficient
+                 ? "it acts by the speed, which is a part of the response"
+                 : "";
+    case EffectOrigin::kMotor:
+      return observations.is_line() ? "a load that a cell was given has no motor" : "";
     case EffectOrigin::kOffset:
       if (shows_zero_offset(observations)) return "";
       return is_made_c_t(observations) && !observations.multiplicative

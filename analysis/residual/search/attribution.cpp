@@ -33,6 +33,7 @@ Attribution Search::run() {
   add_curves(curves);
   find_confounded();
   smooth_curves();
+  measure_gains();
   forget_what_has_a_name();
   result_.session_unknown = session_scatter_is_large();
   result_.final = fit_;

@@ -1,5 +1,5 @@
-// From residuals to named effects: the search, on the runs that are not sealed. docs/closed-loop-method.md has the
-// protocol.
+// From residuals to named effects: the search, on the runs that are not sealed. docs/closed-loop-method.md
+// has the protocol.
 #pragma once
 
 #include "analysis/residual/likelihood/joint_fit.h"

@@ -36,6 +36,14 @@ double correlation_within(const Observations& observations, const std::vector<in
 
 }  // namespace
 
+bool are_within_bounds(const std::vector<GroupEstimate>& groups, const EffectParameter& amplitude) {
+  constexpr std::size_t kOneOf = 20;
+  const auto outside = std::ranges::count_if(groups, [&](const GroupEstimate& group) {
+    return group.low > amplitude.upper || group.high < amplitude.lower;
+  });
+  return static_cast<std::size_t>(outside) * kOneOf <= groups.size();
+}
+
 double likelihood_beside_own(const Observations& observations, const NullFit& fit,
                              const std::vector<int>& rows) {
   double log_size = 0;

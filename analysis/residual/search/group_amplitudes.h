@@ -20,6 +20,9 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
                                              std::size_t t, const NullFit& variances,
                                              const std::vector<int>& rows);
 
+/// Whether no more of their intervals are outside of the physical bounds than chance makes of 95 % intervals.
+bool are_within_bounds(const std::vector<GroupEstimate>& groups, const EffectParameter& amplitude);
+
 /// What may be compared between places of a step or time constants of effects with an amplitude of each
 /// group's own. Their columns are slopes of the baseline: the restricted likelihood, of what is left beside
 /// it, is the larger the less these columns do, whatever they explain (Harville 1974). Without that.

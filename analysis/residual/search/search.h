@@ -52,7 +52,7 @@ class Search {
 
   // named effects: search_effects.cpp
   void add_effects();
-  static bool already_in(const Term& way, const MeanModel& model);
+  bool already_in(const Term& way, const MeanModel& model) const;
   /// All candidates on top of a model, but for what it has, with one amplitude for all groups.
   Scan scan_effects(const JointFit& base) const;
   /// And with an amplitude of each group's own.
@@ -69,6 +69,12 @@ class Search {
   std::vector<Ranked> ranking(const Scan& scan, NullMaxima& maxima) const;
   /// The best candidate whose parameters stay within physics and which predicts blocks that it has not seen.
   bool accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round);
+  /// One of them, alike in all groups or with their own amplitudes. `beyond`: what it would be without
+  /// bounds.
+  bool accept(const Scan& scan, std::size_t best, NullMaxima& maxima, Round& round,
+              std::optional<BeyondBounds>& beyond);
+  /// What each accepted effect does for blocks that were not seen, beside all that was found.
+  void measure_gains();
   /// The rule that keeps a fit's last term out, in words; nothing where none does. `after`: its leave-one-
   /// block-out losses; `gain`: theirs on those without the term.
   std::optional<std::string> why_not(const JointFit& fit, const CrossValidation& after,
@@ -81,9 +87,9 @@ class Search {
   struct InGroups;  // the model with a last term whose amplitude is each group's own
   void add_group_ways(Scan& scan) const;
   InGroups fit_in_groups(Term term, MeanModel model) const;
-  /// How far the leave-one-block-out error falls; nothing where the rules refuse it. `before_others`: also
-  /// where another name does as well for all groups alike.
-  std::optional<double> gain_of(const InGroups& own, bool before_others) const;
+  /// Whether they predict unseen blocks better, within the bounds of physics. `before_others`: and no other
+  /// name does as well for all groups alike.
+  bool are_better(const InGroups& own, bool before_others) const;
   void take(InGroups own);
   /// Effect t with an amplitude of each group's own, where the data ask for it; it is the newest then.
   bool let_groups_differ(std::size_t t, bool before_others);
@@ -117,15 +123,16 @@ class Search {
   bool may_be_another(const std::vector<Term>& terms, const std::vector<Term>& left_out,
                       const JointFit& all) const;
   bool accept_together(const Scan& scan, std::size_t i, double p);
-  /// Whether a course that is straight or bends once over the order of runs does as well as the step, or a
-  /// bend of the baseline's own law.
+  /// Whether a course that is straight or bends up to twice over the order of runs does as well as the step,
+  /// or a bend of the baseline's own law.
   bool is_gradual(const std::vector<Term>& steps, const NullFit& variances,
                   const CrossValidation& with_steps) const;
   /// Of the runs' means within the fit, and its degrees of freedom.
   std::pair<double, double> sum_of_squares(const Observations& observations, const JointFit& fit,
                                            const NullFit& variances) const;
   /// A joint fit with one term more; theory's coefficient where the data do not speak against it.
-  JointFit fit_with(Term term, double amplitude) const;
+  JointFit fit_with(Term term, double amplitude) const { return fit_with(fit_, term, amplitude); }
+  JointFit fit_with(const JointFit& base, Term term, double amplitude) const;
   /// p of a likelihood ratio of one parameter of a fitted model: few rows are no large sample.
   double ratio_p(double ratio, const JointFit& fit) const;
   void read_back_terms();
@@ -135,11 +142,9 @@ class Search {
   /// Or by another form of itself, which was chosen while the newer was not known: the likelier, where each
   /// parameter that a form has more must be worth a ratio test.
   bool change_a_form();
-  /// What swaps try, beside the model without the term, and what they do then.
-  JointFit fit_beside(const JointFit& without, const Scan& scan, std::size_t way);
   /// Of `accepted`, whose term is the model's last.
   void make_newest(std::size_t t);
-  void put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, double p);
+  void put_in_place(std::size_t t, const JointFit& tried, double p);
   double evidence_of(const Scan& scan, const Term& term) const;
   JointFit fit_without(std::size_t t) const { return fit_without(t, observations_); }
   JointFit fit_without(std::size_t t, const Observations& observations) const;
@@ -168,6 +173,8 @@ class Search {
     std::vector<Components> columns;
     ScatterFit scatter;
   };
+  /// Of each rotor, over the condition of the best curve of a single one.
+  static std::vector<Curve> of_each_rotor(const CurveScan& curves);
   /// Beside the model and the best curve, if that has this evidence; or without the curve, where scatter is
   /// likelier.
   ScatterBeside scatter_beside(const CurveScan& curves, double least_evidence, std::mt19937_64& random) const;
@@ -178,6 +185,8 @@ class Search {
   /// `first`: the curves on top of the model as it is.
   void add_curves(const CurveScan& first);
   bool add_best_curve(const CurveScan& curves);
+  /// The best one; where that goes with a place, the same everywhere if it predicts about as well.
+  std::size_t everywhere_instead(const CurveScan& curves) const;
   /// Waves find structure of any shape, but a straight line in them has bends, and a bend has its middle at
   /// that of the range: what they found becomes a smooth curve of as many columns as the data ask for.
   void smooth_curves(std::size_t first = 0);
@@ -227,7 +236,13 @@ class Search {
   /// Effects that step 3 would accept in the newest curve's place, and that predict unseen blocks about as
   /// well. `without`: the fit without the curve.
   void name_newest_curve(const JointFit& without);
-  CrossValidation unseen(const JointFit& fit, const NullFit& variances) const;
+  CrossValidation unseen(const JointFit& fit, const NullFit& variances) const {
+    return unseen(observations_, fit, variances);
+  }
+  CrossValidation unseen(const Observations& observations, const JointFit& fit,
+                         const NullFit& variances) const;
+  /// Of what has been found with these columns in place of its own.
+  CrossValidation unseen_with(const std::vector<Components>& columns, const NullFit& variances) const;
 
   const Observations& whole_;
   const Observations given_;   // nothing is searched, or judged, by a response outside of `rows_`

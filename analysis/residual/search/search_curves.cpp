@@ -74,8 +74,24 @@ bool Search::add_best_curve(const CurveScan& curves) {
   round.outcome = fmt::format("p = {:.3g} for {}", p, tried[best].label());
   result_.curve_rounds.push_back(std::move(round));
   if (p > settings_.alpha) return false;
-  add_curve(tried[best], p);
+  add_curve(tried[everywhere_instead(curves)], p);
   return true;
+}
+
+std::size_t Search::everywhere_instead(const CurveScan& curves) const {
+  const auto& [scan, tried] = curves;
+  const std::size_t best = scan.order[0];
+  const Curve& found = tried[best];
+  if (found.in_place().empty()) return best;
+  const auto errors_with = [&](const Curve& curve) {
+    std::vector<Components> columns = fit_.linear.columns;
+    columns.insert(columns.end(), curve.columns.begin(), curve.columns.end());
+    return unseen_with(columns, fit_.variances);
+  };
+  for (const std::size_t i : scan.order)
+    if (tried[i].everywhere() && tried[i].covariate == found.covariate && tried[i].rotor == found.rotor)
+      return compare(errors_with(tried[i]), errors_with(found)).told_apart() ? best : i;
+  return best;
 }
 
 bool Search::is_described(const Curve& curve) const {

@@ -57,14 +57,19 @@ void Search::add_effects() {
   }
 }
 
-bool Search::already_in(const Term& way, const MeanModel& model) {
-  return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
+bool Search::already_in(const Term& way, const MeanModel& model) const {
+  const auto is_of = [&](const Term& term) {
     const bool another_step =
         way.effect->has_change_point() && !std::equal(way.parameters.begin() + 1, way.parameters.end(),
                                                       term.parameters.begin() + 1, term.parameters.end());
-    return term.effect->cause() == way.effect->cause() && !another_step &&
-           (term.rotor == way.rotor || way.rotor < 0) && term.other == way.other;
-  });
+    return term.effect->cause() == way.effect->cause() && !another_step && term.other == way.other;
+  };
+  const auto of_own_rotor = std::ranges::count_if(
+      model.terms, [&](const Term& term) { return is_of(term) && term.rotor == way.rotor; });
+  // What all do beside what single ones do is one more, as long as one has none of its own.
+  const auto of_single =
+      std::ranges::count_if(model.terms, [&](const Term& term) { return is_of(term) && term.rotor >= 0; });
+  return of_own_rotor > 0 || (way.rotor < 0 && of_single >= observations_.channels());
 }
 
 Search::Scan Search::scan_effects(const JointFit& base) const {
@@ -175,68 +180,79 @@ std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const 
 }
 
 bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round) {
-  std::vector<const Effect*> refused;
+  std::vector<const Effect*> tried;
   std::optional<BeyondBounds> beyond;  // of the first, and none about as good is accepted
-  const CrossValidation before = unseen(fit_, fit_.variances);
+  const std::size_t had = result_.accepted.size();
   for (const std::size_t best : scan.order) {
     if (scan.fits[best].evidence < critical_) break;
     if (beyond && scan.fits[best].evidence < scan.fits[scan.order[0]].evidence - kClearDecades)
       result_.beyond_bounds.push_back(*std::exchange(beyond, std::nullopt));
-    if (scan.others.contains(best)) {
-      const std::size_t had = result_.accepted.size();
-      if (!accept_together(scan, best, maxima.p(scan.fits[best].evidence))) continue;
-      std::vector<std::string> labels;
-      for (std::size_t k = had; k < result_.accepted.size(); ++k)
-        labels.push_back(result_.accepted[k].term.label());
-      round.outcome += fmt::format("accepted {}", fmt::join(labels, " and "));
-      return true;
+    const bool together = scan.others.contains(best);
+    if (!together) {
+      if (std::ranges::find(tried, scan.ways[best].effect) != tried.end()) continue;
+      tried.push_back(scan.ways[best].effect);
     }
-    if (std::find(refused.begin(), refused.end(), scan.ways[best].effect) != refused.end()) continue;
-    refused.push_back(scan.ways[best].effect);
-    const std::size_t i = alike_instead(scan, best);
-    if (scan.ways[i].per_group) {
-      if (accept_in_groups(scan.ways[i], maxima.p(scan.fits[i].evidence))) {
-        round.outcome += "accepted " + result_.accepted.back().term.label();
-        return true;
-      }
-      round.outcome +=
-          fmt::format("{} predicts unseen blocks no better, or not better than what is alike in all; ",
-                      scan.ways[i].label());
+    if (!(together ? accept_together(scan, best, maxima.p(scan.fits[best].evidence))
+                   : accept(scan, best, maxima, round, beyond)))
       continue;
-    }
-    JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
-    const CrossValidation after = unseen(fit, fit.variances);
-    // Both are scored by the variances of the larger model, so that the difference is the mean's.
-    const LossDifference gain = compare(unseen(fit_, fit.variances), after);
-    if (const auto reason = why_not(fit, after, gain)) {
-      round.outcome += *reason + "; ";
-      if (scan.ways[best].per_group &&
-          accept_in_groups(scan.ways[best], maxima.p(scan.fits[best].evidence))) {
-        round.outcome += "accepted " + result_.accepted.back().term.label();
-        return true;
-      }
-      const Term& bounded = fit.model.terms.back();
-      if (best == scan.order[0] && at_bound(fit, bounded) && !lacks_speed_squared(bounded))
-        beyond = beyond_bounds(scan.ways[i], scan.fits[i].amplitude(0));
-      continue;
-    }
-    result_.accepted.push_back({.term = fit.model.terms.back(),
-                                .p = maxima.p(scan.fits[i].evidence),
-                                .gain = before.rmse() - after.rmse(),
-                                .confounded = {}});
-    fit_ = at_best_run(std::move(fit), 1);
-    read_back_terms();
-    let_groups_differ(result_.accepted.size() - 1, true);
-    round.outcome += "accepted " + result_.accepted.back().term.label();
+    std::vector<std::string> labels;
+    for (std::size_t k = had; k < result_.accepted.size(); ++k)
+      labels.push_back(result_.accepted[k].term.label());
+    round.outcome += fmt::format("accepted {}", fmt::join(labels, " and "));
     return true;
   }
   if (beyond) result_.beyond_bounds.push_back(*beyond);
   return false;
 }
 
-CrossValidation Search::unseen(const JointFit& fit, const NullFit& variances) const {
-  return cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns, variances,
+bool Search::accept(const Scan& scan, std::size_t best, NullMaxima& maxima, Round& round,
+                    std::optional<BeyondBounds>& beyond) {
+  const std::size_t i = alike_instead(scan, best);
+  if (scan.ways[i].per_group) {
+    if (accept_in_groups(scan.ways[i], maxima.p(scan.fits[i].evidence))) return true;
+    round.outcome +=
+        fmt::format("{} predicts unseen blocks no better, or not better than what is alike in all; ",
+                    scan.ways[i].label());
+    return false;
+  }
+  JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
+  const CrossValidation after = unseen(fit, fit.variances);
+  // Both are scored by the variances of the larger model, so that the difference is the mean's.
+  if (const auto reason = why_not(fit, after, compare(unseen(fit_, fit.variances), after))) {
+    round.outcome += *reason + "; ";
+    if (scan.ways[best].per_group && accept_in_groups(scan.ways[best], maxima.p(scan.fits[best].evidence)))
+      return true;
+    const Term& bounded = fit.model.terms.back();
+    if (best == scan.order[0] && at_bound(fit, bounded) && !lacks_speed_squared(bounded))
+      beyond = beyond_bounds(scan.ways[i], scan.fits[i].amplitude(0));
+    return false;
+  }
+  result_.accepted.push_back(
+      {.term = fit.model.terms.back(), .p = maxima.p(scan.fits[i].evidence), .confounded = {}});
+  fit_ = at_best_run(std::move(fit), 1);
+  read_back_terms();
+  let_groups_differ(result_.accepted.size() - 1, true);
+  return true;
+}
+
+void Search::measure_gains() {
+  const double with = unseen(fit_, fit_.variances).rmse();
+  for (std::size_t t = 0; t < result_.accepted.size(); ++t) {
+    Observations others =
+        result_.accepted[t].term.per_group ? without_own(observations_, fit_.model, t) : observations_;
+    const JointFit without = fit_in_turns(others, fit_.model.without_term(t), rows_);
+    result_.accepted[t].gain = unseen(others, without, without.variances).rmse() - with;
+  }
+}
+
+CrossValidation Search::unseen(const Observations& observations, const JointFit& fit,
+                               const NullFit& variances) const {
+  return cross_validate(observations, difference(y_, fit.linear.offset), fit.linear.columns, variances,
                         rows_);
+}
+
+CrossValidation Search::unseen_with(const std::vector<Components>& columns, const NullFit& variances) const {
+  return cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
 }
 
 std::optional<std::string> Search::why_not(const JointFit& fit, const CrossValidation& after,
@@ -260,10 +276,10 @@ std::optional<std::string> Search::why_not(const JointFit& fit, const CrossValid
   return std::nullopt;
 }
 
-JointFit Search::fit_with(Term term, double amplitude) const {
+JointFit Search::fit_with(const JointFit& base, Term term, double amplitude) const {
   const EffectParameter& parameter = term.effect->parameters[0];
   term.parameters[0] = std::clamp(amplitude, parameter.lower, parameter.upper);
-  MeanModel model = fit_.model;
+  MeanModel model = base.model;
   model.terms.push_back(term);
   JointFit free = fit_jointly(observations_, model, rows_);
   if (!parameter.theory) return free;

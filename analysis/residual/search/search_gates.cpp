@@ -26,18 +26,20 @@ bool Search::lacks_speed_squared(const Term& term) const {
 
 std::optional<std::string> Search::only_bends(const Term& term, const NullFit& variances,
                                               const CrossValidation& with_term) const {
+  // A law that the baseline has, of a condition that is no load of a cell, may bend as well as the cell.
+  const bool of_law =
+      term.effect->of_force_alone() && !observations_.baseline_over.empty() && !observations_.is_line();
   for (const Curve& curve : curves_) {
     const auto shares = [&](const Accepted& other) {
       return is_over(curve, own_conditions(*other.term.effect, observations_)) &&
              (other.term.rotor < 0 || other.term.rotor == term.rotor);
     };
     if (!is_bend_over(curve, own_conditions(*term.effect, observations_), term.rotor) ||
-        std::none_of(result_.accepted.begin(), result_.accepted.end(), shares))
+        (!of_law && std::ranges::none_of(result_.accepted, shares)))
       continue;
     std::vector<Components> columns = fit_.linear.columns;
     columns.push_back(without_trend(curve, rows_).columns[0]);
-    const CrossValidation with_bend =
-        cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
+    const CrossValidation with_bend = unseen_with(columns, variances);
     if (!compare(with_bend, with_term).told_apart()) return curve.covariate;
   }
   return {};
@@ -53,16 +55,14 @@ bool Search::is_gradual(const std::vector<Term>& steps, const NullFit& variances
   }
   std::vector<Components> columns = fit_.linear.columns;
   const double half = static_cast<double>(observations_.rows() - 1) / 2;
-  for (const int power : {1, 2}) {
+  for (const int power : {1, 2, 3}) {
     for (const Components& after : always) {
       columns.push_back(after);
       for (Eigen::MatrixXd& component : columns.back())
         for (Index row = 0; row < component.rows(); ++row)
           component.row(row) *= std::pow(static_cast<double>(row) / half - 1, power);
     }
-    const CrossValidation with_trend =
-        cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
-    if (compare(with_trend, with_steps).mean <= 0) return true;
+    if (compare(unseen_with(columns, variances), with_steps).mean <= 0) return true;
   }
   // That the line or power law of the baseline holds all along is an assumption (a wing stalls).
   return std::ranges::any_of(curves_, [&](const Curve& curve) {
@@ -71,10 +71,7 @@ bool Search::is_gradual(const std::vector<Term>& steps, const NullFit& variances
       return false;
     std::vector<Components> with_curve = fit_.linear.columns;
     with_curve.insert(with_curve.end(), curve.columns.begin(), curve.columns.end());
-    return !compare(cross_validate(observations_, difference(y_, fit_.linear.offset), with_curve, variances,
-                                   rows_),
-                    with_steps)
-                .told_apart();
+    return !compare(unseen_with(with_curve, variances), with_steps).told_apart();
   });
 }
 

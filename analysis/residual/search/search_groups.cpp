@@ -69,19 +69,16 @@ Search::InGroups Search::fit_in_groups(Term term, MeanModel model) const {
   return own;
 }
 
-std::optional<double> Search::gain_of(const InGroups& own, bool before_others) const {
+bool Search::are_better(const InGroups& own, bool before_others) const {
   const JointFit& fit = own.fit;
-  if (!fit.at_bound.empty()) return {};
-  const CrossValidation after = cross_validate(own.observations, difference(y_, fit.linear.offset),
-                                               fit.linear.columns, fit.variances, rows_);
-  const CrossValidation before = cross_validate(observations_, difference(y_, fit_.linear.offset),
-                                                fit_.linear.columns, fit.variances, rows_);
+  if (!fit.at_bound.empty()) return false;
+  const CrossValidation after = unseen(own.observations, fit, fit.variances);
+  const CrossValidation before = unseen(fit_, fit.variances);
   const LossDifference gain = compare(before, after);
   if (!(gain.mean > gain.standard_error) ||
       !groups_within_bounds(own.observations, fit, fit.model.terms.size() - 1))
-    return {};
-  if (before_others && another_does_as_well(after, fit.variances)) return {};
-  return before.rmse() - after.rmse();
+    return false;
+  return !before_others || !another_does_as_well(after, fit.variances);
 }
 
 void Search::take(InGroups own) {
@@ -107,7 +104,7 @@ bool Search::let_groups_differ(std::size_t t, bool before_others) {
     return false;
   InGroups own = fit_in_groups(term, fit_.model.without_term(t));
   if (p_of_groups(observations_, fit_, own.observations, own.fit) > settings_.alpha ||
-      !gain_of(own, before_others))
+      !are_better(own, before_others))
     return false;
   make_newest(t);
   take(std::move(own));
@@ -129,9 +126,8 @@ bool Search::let_any_differ() {
 
 bool Search::accept_in_groups(const Term& way, double p) {
   InGroups own = fit_in_groups(way, fit_.model);
-  const std::optional<double> gain = gain_of(own, true);
-  if (!gain) return false;
-  result_.accepted.push_back({.term = own.fit.model.terms.back(), .p = p, .gain = *gain, .confounded = {}});
+  if (!are_better(own, true)) return false;
+  result_.accepted.push_back({.term = own.fit.model.terms.back(), .p = p, .confounded = {}});
   take(std::move(own));
   return true;
 }
@@ -157,8 +153,7 @@ bool Search::another_does_as_well(const CrossValidation& own, const NullFit& var
     tried.push_back(name);
     const JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
     if (!fit.at_bound.empty()) continue;
-    const CrossValidation with_both = cross_validate(observations_, difference(y_, fit.linear.offset),
-                                                     fit.linear.columns, variances, rows_);
+    const CrossValidation with_both = unseen(fit, variances);
     // A step chooses its place among all: it must do better.
     const bool as_well = scan.ways[i].effect->has_change_point() ? compare(own, with_both).told_apart()
                                                                  : !compare(with_both, own).told_apart();
@@ -168,13 +163,8 @@ bool Search::another_does_as_well(const CrossValidation& own, const NullFit& var
 }
 
 bool Search::groups_within_bounds(const Observations& wider, const JointFit& fit, std::size_t t) const {
-  constexpr std::size_t kOneOf = 20;  // 95 % intervals
-  const EffectParameter& amplitude = fit.model.terms[t].effect->parameters[0];
-  const auto groups = estimate_by_group(wider, fit.model, t, fit.variances, rows_);
-  const auto outside = std::count_if(groups.begin(), groups.end(), [&](const GroupEstimate& group) {
-    return group.low > amplitude.upper || group.high < amplitude.lower;
-  });
-  return static_cast<std::size_t>(outside) * kOneOf <= groups.size();
+  return are_within_bounds(estimate_by_group(wider, fit.model, t, fit.variances, rows_),
+                           fit.model.terms[t].effect->parameters[0]);
 }
 
 double Search::p_of_groups(const Observations& fewer, const JointFit& without, const Observations& wider,

@@ -102,8 +102,7 @@ std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
     instead.terms[t] = way;
     instead.terms[t].per_group = true;
     const JointFit fit = fit_in_turns(other, instead, rows_);
-    const CrossValidation with_other =
-        cross_validate(other, difference(y_, fit.linear.offset), fit.linear.columns, fit_.variances, rows_);
+    const CrossValidation with_other = unseen(other, fit, fit_.variances);
     if (compare(with_other, own).told_apart()) continue;
     const double evidence =
         -std::log10(std::max(p_of_groups(fewer, without, other, fit), 1e-300)) + std::log10(kWeightInGroups);

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace tunnelrig {
@@ -90,6 +91,19 @@ Search::ScatterBeside Search::scatter_beside(const CurveScan& curves, double lea
   return is_scatter ? alone : with;
 }
 
+std::vector<Curve> Search::of_each_rotor(const CurveScan& curves) {
+  const auto best =
+      std::ranges::find_if(curves.scan.order, [&](std::size_t i) { return curves.tried[i].rotor >= 0; });
+  std::vector<Curve> result;
+  if (best == curves.scan.order.end()) return result;
+  const Curve& first = curves.tried[*best];
+  std::ranges::copy_if(curves.tried, std::back_inserter(result), [&](const Curve& curve) {
+    return curve.rotor >= 0 && curve.covariate == first.covariate && curve.shape == first.shape &&
+           curve.place.name == first.place.name && curve.columns.size() == first.columns.size();
+  });
+  return result;
+}
+
 bool Search::begin_with_scatter_of(const CurveScan& curves) {
   const RunScatter& before = observations_.scatter;
   const bool known = before.rotors_differ();
@@ -107,8 +121,12 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
     return without(y, of, fit_amplitudes(scattered, y, of, beside.scatter.variances, rows_).amplitude);
   };
   const Components residual = left_beside(columns);
-  // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter.
-  const Eigen::VectorXd contrasts = contrast_scatter(scattered, rows_, residual, fifth);
+  // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter. What a
+  // condition does to them in pairs is none.
+  std::vector<Components> with_each_rotor = columns;
+  for (const Curve& curve : of_each_rotor(curves))
+    with_each_rotor.insert(with_each_rotor.end(), curve.columns.begin(), curve.columns.end());
+  const Eigen::VectorXd contrasts = contrast_scatter(scattered, rows_, left_beside(with_each_rotor), fifth);
   if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, rows_, residual, other);
   const MixedModel model(scattered, rows_);
   const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);

@@ -107,19 +107,14 @@ bool Search::accept_together(const Scan& scan, std::size_t i, double p) {
     return false;
   JointFit all = fit_with_all(terms);
   if (!all.at_bound.empty() || (!pair && may_be_another(terms, left_out, all))) return false;
-  const auto errors_of = [&](const JointFit& fit) {
-    return cross_validate(observations_, difference(y_, fit.linear.offset), fit.linear.columns, all.variances,
-                          rows_);
-  };
-  const CrossValidation before = errors_of(fit_), after = errors_of(all);
+  const CrossValidation before = unseen(fit_, all.variances), after = unseen(all, all.variances);
   const LossDifference gain = compare(before, after);
   if (!(gain.mean > gain.standard_error)) return false;
   if (pair && terms[0].effect->has_change_point() && is_gradual(terms, all.variances, after)) return false;
   fit_ = pair ? at_best_run(at_best_run(std::move(all), 1), 2) : std::move(all);
   const auto newest = fit_.model.terms.end() - static_cast<std::ptrdiff_t>(terms.size());
   for (auto term = newest; term != fit_.model.terms.end(); ++term)
-    result_.accepted.push_back(
-        {.term = *term, .p = p, .gain = before.rmse() - after.rmse(), .confounded = {}});
+    result_.accepted.push_back({.term = *term, .p = p, .confounded = {}});
   read_back_terms();
   return true;
 }

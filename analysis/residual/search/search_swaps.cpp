@@ -37,12 +37,12 @@ void Search::swap_weaker() {
     const std::size_t best = scan.order[0];
     if (scan.ways[best].same_way(old) || !(scan.fits[best].evidence > evidence_of(scan, old) + kSwapDecades))
       continue;
-    const JointFit tried = fit_beside(without, scan, best);
+    const JointFit tried = fit_with(without, scan.ways[best], scan.fits[best].amplitude(0));
     if (!(tried.variances.log_likelihood > fit_.variances.log_likelihood) || !tried.at_bound.empty())
       continue;
     NullMaxima maxima = maxima_of(without, scan, ++salt_);
     if (const double p = maxima.p(scan.fits[best].evidence); p <= settings_.alpha)
-      put_in_place(t--, without, tried, p);
+      put_in_place(t--, tried, p);
     else
       drop(t--, without);  // with the newest in, neither is beyond chance
   }
@@ -59,28 +59,19 @@ bool Search::change_a_form() {
     for (const std::size_t i : scan.order)
       if (other(scan.ways[i])) best.emplace(scan.ways[i].effect->form, i);
     for (const auto& [form, i] : best) {
-      const JointFit tried = fit_beside(without, scan, i);
+      const JointFit tried = fit_with(without, scan.ways[i], scan.fits[i].amplitude(0));
       if (!(worth(tried) > worth(fit_)) || !tried.at_bound.empty()) continue;
-      put_in_place(t, without, tried, maxima_of(without, scan, ++salt_).p(scan.fits[i].evidence));
+      put_in_place(t, tried, maxima_of(without, scan, ++salt_).p(scan.fits[i].evidence));
       return true;
     }
   }
   return false;
 }
 
-JointFit Search::fit_beside(const JointFit& without, const Scan& scan, std::size_t way) {
-  const JointFit current = std::exchange(fit_, without);
-  JointFit tried = fit_with(scan.ways[way], scan.fits[way].amplitude(0));
-  fit_ = current;
-  return tried;
-}
-
-void Search::put_in_place(std::size_t t, const JointFit& without, const JointFit& tried, double p) {
-  const auto rmse_of = [this](const JointFit& fit) { return unseen(fit, fit.variances).rmse(); };
+void Search::put_in_place(std::size_t t, const JointFit& tried, double p) {
   fit_ = tried;
   make_newest(t);
   result_.accepted.back().p = p;
-  result_.accepted.back().gain = rmse_of(without) - rmse_of(fit_);
   read_back_terms();
 }
 
