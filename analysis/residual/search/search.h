@@ -173,7 +173,8 @@ class Search {
     std::vector<Components> columns;
     ScatterFit scatter;
   };
-  /// Of each rotor, over the condition of the best curve of a single one.
+  /// Of single rotors over one condition, those that explain the most together; none where chance does as
+  /// much.
   static std::vector<Curve> of_each_rotor(const CurveScan& curves);
   /// Beside the model and the best curve, if that has this evidence; or without the curve, where scatter is
   /// likelier.

@@ -7,7 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <map>
+#include <string>
 #include <utility>
 
 namespace tunnelrig {
@@ -92,16 +93,28 @@ Search::ScatterBeside Search::scatter_beside(const CurveScan& curves, double lea
 }
 
 std::vector<Curve> Search::of_each_rotor(const CurveScan& curves) {
-  const auto best =
-      std::ranges::find_if(curves.scan.order, [&](std::size_t i) { return curves.tried[i].rotor >= 0; });
-  std::vector<Curve> result;
-  if (best == curves.scan.order.end()) return result;
-  const Curve& first = curves.tried[*best];
-  std::ranges::copy_if(curves.tried, std::back_inserter(result), [&](const Curve& curve) {
-    return curve.rotor >= 0 && curve.covariate == first.covariate && curve.shape == first.shape &&
-           curve.place.name == first.place.name && curve.columns.size() == first.columns.size();
-  });
-  return result;
+  struct OfRotors {
+    double worth = 0;
+    std::vector<Curve> curves;
+    std::size_t columns() const { return curves[0].columns.size(); }
+  };
+  using Condition = std::pair<std::string, std::string>;  // and where
+  std::map<Condition, std::map<std::pair<CurveShape, std::size_t>, OfRotors>> all;
+  std::pair<double, Condition> best;
+  for (std::size_t i = 0; i < curves.tried.size(); ++i) {
+    const Curve& curve = curves.tried[i];
+    if (curve.rotor < 0) continue;
+    const Condition condition{curve.covariate, curve.place.name};
+    OfRotors& own = all[condition][{curve.shape, curve.columns.size()}];
+    own.worth += curves.scan.fits[i].likelihood_ratio - static_cast<double>(curve.columns.size());
+    own.curves.push_back(curve);
+    best = std::max(best, {own.worth, condition});
+  }
+  if (!(best.first > 0)) return {};
+  // What the best of these shapes is by a little too straight for would be a scatter.
+  const auto& shapes = all.at(best.second);
+  return std::ranges::max_element(shapes, {}, [](const auto& shape) { return shape.second.columns(); })
+      ->second.curves;
 }
 
 bool Search::begin_with_scatter_of(const CurveScan& curves) {
@@ -121,13 +134,14 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
     return without(y, of, fit_amplitudes(scattered, y, of, beside.scatter.variances, rows_).amplitude);
   };
   const Components residual = left_beside(columns);
-  // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter. What a
-  // condition does to them in pairs is none.
+  // What a condition does to single rotors, or to them in pairs, is no scatter.
   std::vector<Components> with_each_rotor = columns;
   for (const Curve& curve : of_each_rotor(curves))
     with_each_rotor.insert(with_each_rotor.end(), curve.columns.begin(), curve.columns.end());
-  const Eigen::VectorXd contrasts = contrast_scatter(scattered, rows_, left_beside(with_each_rotor), fifth);
-  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, rows_, residual, other);
+  const Components of_rotors = left_beside(with_each_rotor);
+  // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter.
+  const Eigen::VectorXd contrasts = contrast_scatter(scattered, rows_, of_rotors, fifth);
+  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, rows_, of_rotors, other);
   const MixedModel model(scattered, rows_);
   const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);
   scatter.run_correlation = run_correlation(model, variances, residual, random);

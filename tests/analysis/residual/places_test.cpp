@@ -42,6 +42,22 @@ struct Places : testing::Test {
   }
 };
 
+/// One of six groups is outside: what is the same there is not the tunnel's.
+TEST_F(Places, WhatIsAlikeEverywhereIsNoMatterOfThePlace) {
+  constexpr int kCampaigns = 6;
+  int everywhere = 0;
+  for (int campaign = 0; campaign < kCampaigns; ++campaign) {
+    Observations o = observations();
+    test::add_covariate(o, "pitch_mrad", -1, 1, random);
+    add(o, 0.004 * o.find("pitch_mrad")->value.col(0));
+    const Explanation e = explained(o);
+    ASSERT_FALSE(e.unknown.empty()) << explanation_text(e);
+    EXPECT_EQ(e.unknown[0].covariate, "pitch_mrad");
+    everywhere += e.unknown[0].place.empty() ? 1 : 0;
+  }
+  EXPECT_GE(everywhere, kCampaigns - 1);
+}
+
 /// Above and below the middle in opposite directions: no name and no curve for all places alike can say it.
 TEST_F(Places, WhatIsOppositeAboveAndBelowIsFound) {
   Observations o = observations();

@@ -5,6 +5,8 @@
 #include "analysis/residual/search/step_profile.h"
 #include "analysis/residual/tables.h"
 
+#include <numbers>
+
 #include <gmock/gmock.h>
 
 namespace tunnelrig {
@@ -12,6 +14,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 using test::explained;
 using testing::Contains;
 using testing::HasSubstr;
@@ -51,6 +54,18 @@ TEST_F(Steps, AGradualChangeIsNoStep) {
   const Explanation e = explained(o);
   EXPECT_EQ(names(e), "");
   EXPECT_EQ(e.verdict, "unknown");
+}
+
+TEST_F(Steps, ASlowWaveIsNoStep) {
+  Observations o = ordered();
+  const VectorXd along = VectorXd::LinSpaced(o.rows(), 0, 2 * std::numbers::pi);
+  MatrixXd y = o.y;
+  y.colwise() += 0.004 * along.array().sin().matrix();
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  EXPECT_EQ(names(e), "");
+  ASSERT_FALSE(e.unknown.empty()) << explanation_text(e);
+  EXPECT_EQ(e.unknown[0].covariate, "run_order");
 }
 
 /// A fan that is switched makes the runs scatter by as much as the step, until its curve is in: only then can

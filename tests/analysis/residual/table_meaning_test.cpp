@@ -1,4 +1,5 @@
 // What a table's units, blocks and baseline mean for what is found in it.
+#include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/observations/parts_of_equal_size.h"
 #include "analysis/residual/tables.h"
 #include "support/message_of.h"
@@ -240,6 +241,33 @@ TEST_F(TablesTest, HeavyTailsAreNotSetAside) {
       aside += row.set_aside ? 1 : 0;
   }
   EXPECT_LE(aside, 2);
+}
+
+/// Voltage acts by the speed, which a coefficient has; and a cell that is loaded has no motor.
+TEST_F(TablesTest, WhatDrivesAMotorIsSoughtWhereItCanBeSeen) {
+  std::string csv = "set,V,t,load,y\n";
+  for (int r = 0; r < 80; ++r)
+    csv += fmt::format("{},{},{},{},{}\n", r / 8, 11 + even(random), 300 * even(random),
+                       10 * even(random) + 1, 3 * (1 + 0.01 * scatter(random)));
+  const auto tested = [&](const char* effect, const std::string& response, const std::string& baseline) {
+    return testability(test::effect_named(effect),
+                       observed(csv,
+                                "blocks = \"set\"\n[response]\ncolumn = \"y\"\n" + response +
+                                    "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\n"
+                                    "meaning = \"supply_voltage_V\"\n"
+                                    "[[covariates]]\ncolumn = \"t\"\nunit = \"s\"\n"
+                                    "meaning = \"time_since_motor_start_s\"\n"
+                                    "[[covariates]]\ncolumn = \"load\"\nunit = \"N\"\n",
+                                baseline))
+        .ok();
+  };
+  const std::string thrust = "unit = \"N\"\nmeaning = \"thrust_N\"\n",
+                    coefficient = "unit = \"1\"\nmeaning = \"c_t\"\n", counts = "unit = \"counts\"\n";
+  EXPECT_TRUE(tested("supply_voltage", thrust, ""));
+  EXPECT_FALSE(tested("supply_voltage", coefficient, ""));
+  EXPECT_TRUE(tested("motor_warm_up", thrust, ""));
+  EXPECT_FALSE(tested("motor_warm_up", counts, "linear:load"));
+  EXPECT_TRUE(tested("creep", counts, "linear:load"));
 }
 
 TEST_F(TablesTest, PowerInWeatherIsTheAirsDensity) {
