@@ -149,13 +149,33 @@ bool baseline_does_better(const Explanation& explanation) {
          explanation.sealed.against_adopted;
 }
 
+/// Curves of single rotors over its own condition beside what it says of all, in words: it may be no more
+/// than what these leave of each other. The condition is found then, where the names alone make the error
+/// larger.
+std::string contradiction(const AdoptedEffect& adopted, const Explanation& explanation,
+                          const Observations& observations) {
+  if (adopted.term.rotor >= 0 || explanation.after.held_out_rmse <= explanation.before.held_out_rmse)
+    return "";
+  const std::vector<std::string> own = own_conditions(*adopted.term.effect, observations);
+  const auto of_one = [&](const UnknownStructure& unknown) {
+    return unknown.rotor >= 0 && !unknown.by_sealed_too &&
+           std::ranges::find(own, unknown.condition) != own.end();
+  };
+  const auto curve = std::ranges::find_if(explanation.unknown, of_one);
+  if (curve == explanation.unknown.end()) return "";
+  return fmt::format(
+      "curves of single rotors over {} say otherwise, and without them it makes the error larger",
+      curve->condition);
+}
+
 Refuted refuted(const Explanation& explanation, const Observations& observations) {
   std::vector<std::pair<const AdoptedEffect*, std::string>> against;  // and why
   bool refutable = false;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     refutable = refutable || !adopted.term.effect->theory_only;
-    if (std::string why = refutation(adopted, observations); !why.empty())
-      against.emplace_back(&adopted, std::move(why));
+    std::string why = refutation(adopted, observations);
+    if (why.empty()) why = contradiction(adopted, explanation, observations);
+    if (!why.empty()) against.emplace_back(&adopted, std::move(why));
   }
   // With the wrong one of two equals in, the sealed runs are far from all that was found, and no other effect
   // is seen beside it: what has equals goes first, and the rest is judged beside the one that is left.
@@ -166,7 +186,8 @@ Refuted refuted(const Explanation& explanation, const Observations& observations
     result.terms.push_back(adopted->term);
     result.why.push_back(std::move(why));
     result.beyond |= adopted->at_bound || !no_more_than_a_line(*adopted, observations).empty();
-    result.structure |= adopted->bends_away || adopted->anywhere;
+    result.structure |= adopted->bends_away || adopted->anywhere ||
+                        !contradiction(*adopted, explanation, observations).empty();
   }
   result.all =
       against.empty() && refutable && (curves_do_better(explanation) || baseline_does_better(explanation));

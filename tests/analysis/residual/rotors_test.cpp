@@ -50,6 +50,23 @@ TEST_F(Rotors, WhatAConditionDoesInPairsIsNoScatter) {
   }
 }
 
+/// A wind that lifts the front rotors and presses the rear ones: beside curves of two, what is left of the
+/// others goes down in all, as a wind from the front would have it.
+TEST_F(Rotors, WhatTwoDoIsNoNameOfAll) {
+  for (const double size : {1.5, 2.5}) {
+    Observations o = observations();
+    const VectorXd wind = o.find("tunnel_airspeed_m_s")->value.col(0);
+    MatrixXd y = o.y;
+    y.leftCols(2).colwise() += 30 * size * kRunSigma * wind.cwiseAbs2();
+    y.rightCols(2).colwise() -= 30 * size * kRunSigma * wind.cwiseAbs2();
+    test::set_y(o, y);
+    const Explanation e = explained(o);
+    EXPECT_EQ(names(e), "") << explanation_text(e);
+    ASSERT_FALSE(e.unknown.empty());
+    EXPECT_EQ(e.unknown[0].covariate, "tunnel_airspeed_m_s");
+  }
+}
+
 /// Cells that each drift in their own measure: two of their own, and what all have.
 TEST_F(Rotors, WhatAllDoIsFoundBesideSingleOnes) {
   Observations o = observations();
