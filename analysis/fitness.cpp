@@ -17,7 +17,6 @@
 namespace tunnelrig {
 namespace {
 
-constexpr double kSpeedTolerance = 0.003;    // of the nominal speed, the thesis's ±15 rev/min
 constexpr double kTachometerAgrees = 0.005;  // shaft line against tachometer
 
 class Fitness : public Findings {

@@ -186,12 +186,6 @@ std::vector<SpectralLine> peaks(const WelchSpectrum& spectrum, std::size_t chann
   return found;
 }
 
-/// Where a frequency appears after sampling.
-double folded(double frequency_hz, double rate_hz) {
-  const double rest = std::fmod(frequency_hz, rate_hz);
-  return std::min(rest, rate_hz - rest);
-}
-
 /// What a line may be, and how far it may be off: what follows from a multiple of the shaft's frequency is k
 /// times as uncertain, and the grid is never quite at its frequency.
 struct Origin {

@@ -3,6 +3,8 @@
 
 #include "datasets/run_statistics.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -47,6 +49,12 @@ class WelchSpectrum {
 };
 
 /// A line at the mains' frequency or one of its harmonics, by its name.
+/// Where a frequency appears after sampling.
+inline double folded(double frequency_hz, double rate_hz) {
+  const double rest = std::fmod(frequency_hz, rate_hz);
+  return std::min(rest, rate_hz - rest);
+}
+
 inline bool is_mains(std::string_view name) { return name.starts_with("mains"); }
 
 /// Whether a line may be the mains' own: within a bin and a half of 4096 frames of 50 or 60 Hz, whichever the

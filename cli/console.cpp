@@ -49,10 +49,7 @@ void remember_arguments(int argc, const char* const* argv) {
 
 const std::string& arguments() { return command_line; }
 
-std::string now_utc() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return format_utc(static_cast<double>(std::chrono::duration_cast<std::chrono::seconds>(now).count()));
-}
+std::string now_utc() { return format_utc(std::floor(utc_seconds())); }
 
 namespace {
 

@@ -6,7 +6,6 @@
 #include "datasets/sqlite.h"
 
 #include <charconv>
-#include <chrono>
 #include <system_error>
 
 #include <fcntl.h>
@@ -70,11 +69,6 @@ void sync_to_disk(const std::filesystem::path& path) {
   if (fd < 0) return;
   ::fsync(fd);
   ::close(fd);
-}
-
-std::string now_utc() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return format_utc(std::chrono::duration<double>(now).count());
 }
 
 /// `name`.PROCESS.part: a staged campaign of some process, and no file of the user's.
@@ -276,7 +270,7 @@ std::int64_t CampaignFile::add_document(std::string_view kind, const Provenance&
             "INSERT INTO documents (kind, created_utc, program_version, arguments, inputs, document) "
             "VALUES (?, ?, ?, ?, ?, ?)")
       .bind(kind)
-      .bind(now_utc())
+      .bind(format_utc(utc_seconds()))
       .bind(provenance.program_version)
       .bind(provenance.arguments)
       .bind(provenance.inputs)

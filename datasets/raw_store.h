@@ -63,11 +63,13 @@ class FrameSink {
   virtual void gap(const Gap& gap) = 0;
 };
 
+inline constexpr double kChunk_s = 0.1;  // no blob holds more of a run
+
 /// Writes one run. Frames collect in memory until `commit`, which makes them and the ledger durable in one
 /// transaction (inside a staged campaign: joins its transaction).
 class RawWriter : public FrameSink {
  public:
-  /// `max_chunk_frames` is 0.1 s of frames at most. Throws InputError where the run exists already.
+  /// `max_chunk_frames` is kChunk_s of frames at most. Throws InputError where the run exists already.
   RawWriter(CampaignFile& file, const std::string& run, const RawFormat& format,
             std::size_t max_chunk_frames);
 

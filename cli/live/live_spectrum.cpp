@@ -15,8 +15,7 @@ constexpr int kBladeHarmonics = 5;  // the last are aliases at the usual rate
 constexpr int kMainsHarmonics = 3;
 
 MarkedLine marked(const std::string& name, double frequency_hz, double rate_hz) {
-  const double rest = std::fmod(frequency_hz, rate_hz);
-  return {name, frequency_hz, std::min(rest, rate_hz - rest), frequency_hz > rate_hz / 2};
+  return {name, frequency_hz, folded(frequency_hz, rate_hz), frequency_hz > rate_hz / 2};
 }
 
 std::string harmonic(const char* name, int k) { return k == 1 ? name : fmt::format("{} ×{}", name, k); }
