@@ -45,10 +45,11 @@ LiveSpectrum live_spectrum(const FrameWindow& frames, const Scale& scale, const 
     std::transform(power.begin(), power.end(), std::back_inserter(amplitude),
                    [](double value) { return std::sqrt(value); });
     spectrum.amplitude.push_back(std::move(amplitude));
-    const double seen_hz =
-        find_lines(welch, c, rate_hz,
-                   {.shaft_hz = info.rig.nominal_speed_rpm / 60, .blades = info.rig.blades})
-            .shaft_hz;
+    const double seen_hz = find_lines(welch, c, rate_hz,
+                                      {.shaft_hz = info.rig.nominal_speed_rpm / 60,
+                                       .blades = info.rig.blades,
+                                       .mains_hz = info.daq.mains_hz})
+                               .shaft_hz;
     if (seen_hz > 0) shafts.push_back(seen_hz);
   }
   if (!shafts.empty()) {
