@@ -129,6 +129,8 @@ class StagedCampaign {
   StagedCampaign& operator=(const StagedCampaign&) = delete;
 
   CampaignFile& file() { return *file_; }
+
+  /// Throws StorageError, and leaves the target as it was, where the new file may not be on the disk.
   void publish();
 
  private:
