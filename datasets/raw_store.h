@@ -109,6 +109,13 @@ std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run);
 /// missing.
 void read_raw(const CampaignFile& file, const RawRun& run, FrameSink& sink);
 
+/// The hash of what is stored of a run, as RawWriter makes it; of what can be read where it is damaged.
+struct StoredHash {
+  std::string hash;
+  bool damaged = false;  // a blob fails its CRC, or one is missing
+};
+StoredHash hash_of_raw(const CampaignFile& file, const RawRun& run);
+
 /// Runs left in state "recording" belong to a recorder that was killed: marks them partial, with their hash
 /// and, in the ledger, the reason. The file must be open for recording, so that nobody can still be writing
 /// them. Returns their names.
