@@ -144,6 +144,13 @@ void ProgressBar::show(const std::string& note) {
   tell(error_is_terminal() ? "\r\x1b[K" + text : text + "\n");
 }
 
+std::function<void(std::size_t done, std::size_t total)> show_on(ProgressBar& bar, const char* what) {
+  return [&bar, what](std::size_t done, std::size_t total) {
+    bar.show(static_cast<double>(done), static_cast<double>(total),
+             fmt::format("{} {} of {}", what, done, total));
+  };
+}
+
 std::string duration_text(double seconds) {
   if (seconds < 60) return fmt::format("{:.0f} s", seconds);
   if (seconds < 3600)
