@@ -127,7 +127,6 @@ std::span<const double> WelchSpectrum::power(std::size_t channel) const {
 }
 
 // --- lines
-// -----------------------------------------------------------------------------------------------------
 
 namespace {
 

@@ -22,7 +22,8 @@ class WelchSpectrum {
   /// Consecutive frames, channel by channel within a frame, in volts less anything constant.
   void add(std::span<const float> frames);
 
-  /// Frames are missing here: no window reaches across.
+  /// Frames are missing here: no window reaches across, but among the first 8192 frames, before which their
+  /// length is not chosen.
   void interrupt();
 
   /// The run is over: averages of the power of bins 0 … window/2, channel after channel; empty for fewer than
@@ -48,13 +49,13 @@ class WelchSpectrum {
   std::vector<double> power_;
 };
 
-/// A line at the mains' frequency or one of its harmonics, by its name.
 /// Where a frequency appears after sampling.
 inline double folded(double frequency_hz, double rate_hz) {
   const double rest = std::fmod(frequency_hz, rate_hz);
   return std::min(rest, rate_hz - rest);
 }
 
+/// A line at the mains' frequency or one of its harmonics, by its name.
 inline bool is_mains(std::string_view name) { return name.starts_with("mains"); }
 
 /// Whether a line may be the mains' own: within a bin and a half of 4096 frames of 50 or 60 Hz, whichever the
