@@ -17,8 +17,24 @@
 namespace tunnelrig {
 namespace {
 
-constexpr double kSpeedTolerance = 0.003;    // of the nominal speed, the thesis's ±15 rev/min
 constexpr double kTachometerAgrees = 0.005;  // shaft line against tachometer
+
+std::string with_share(const std::string& name, std::uint64_t frames, std::uint64_t of) {
+  return fmt::format("{} ({:.2g} %)", name, 100.0 * static_cast<double>(frames) / static_cast<double>(of));
+}
+
+/// Runs, or channels of runs, by what is wrong with them.
+struct ChannelFaults {
+  Names stuck, dead, clipped, overloaded;
+  Names flagged, erroneous, pattern;  // by the board itself
+
+  void add_flags(const std::string& run, const Ledger& ledger) {
+    if (ledger.frames_test_pattern > 0) pattern.add(run);
+    if (ledger.frames_clipped > 0) flagged.add(with_share(run, ledger.frames_clipped, ledger.frames_stored));
+    if (ledger.frames_adc_error > 0)
+      erroneous.add(with_share(run, ledger.frames_adc_error, ledger.frames_stored));
+  }
+};
 
 class Fitness : public Findings {
  public:
@@ -88,65 +104,26 @@ class Fitness : public Findings {
   }
 
   void channels() {
-    Names stuck, dead, clipped, flagged, erroneous, pattern, overloaded;
-    for (const Run& run : data_.runs) {
-      const auto statistics = data_.statistics.find(run.run);
-      if (statistics == data_.statistics.end() || !run.excluded.empty()) continue;
-      const auto raw = data_.raw.find(run.run);
-      const bool counts = raw != data_.raw.end() && is_counts(raw->second.format.type);
-      const auto ledger = raw == data_.raw.end() ? std::nullopt : ledger_of(file_, raw->second.id);
-      if (ledger && ledger->frames_test_pattern > 0) pattern.add(run.run);
-      const auto add_flagged = [&](Names& names, std::uint64_t frames) {
-        if (frames > 0)
-          names.add(
-              fmt::format("{} ({:.2g} %)", run.run,
-                          100.0 * static_cast<double>(frames) / static_cast<double>(ledger->frames_stored)));
-      };
-      if (ledger) {
-        add_flagged(flagged, ledger->frames_clipped);
-        add_flagged(erroneous, ledger->frames_adc_error);
-      }
-      for (int rotor = 0; rotor < data_.info.rig.rotors; ++rotor) {
-        const ChannelStatistics& channel = statistics->second.channels[static_cast<std::size_t>(rotor)];
-        const std::string name = fmt::format("{} channel {}", run.run, rotor + 1);
-        if (channel.stuck())
-          stuck.add(name);
-        else if (run.kind == RunKind::kThrust && counts &&
-                 channel.std_V < kDeadNoise_counts * data_.info.daq.volts_per_count())
-          dead.add(name);
-        if (channel.clipped > 0) {
-          clipped.add(fmt::format(
-              "{} ({:.2g} %)", name,
-              100.0 * static_cast<double>(channel.clipped) / static_cast<double>(statistics->second.frames)));
-        }
-        if (data_.certificate && run.kind == RunKind::kThrust &&
-            data_.certificate->force(rotor + 1, channel.mean_V).extrapolated)
-          overloaded.add(name);
-      }
-    }
-    if (!stuck.empty())
-      problem("channels", "stuck, never change: " + stuck.text(),
-              "check cell, amplifier and plug; record these runs again");
-    if (!dead.empty())
-      problem("channels", "dead, less noise than a converter has: " + dead.text(),
-              "check cell, amplifier and plug");
-    if (!clipped.empty())
-      problem("channels", "clipped: " + clipped.text(),
-              "lower the amplifier's gain; clipped means are biased");
-    if (!flagged.empty())
-      problem("channels", "the board flags frames as clipped: " + flagged.text(),
-              "lower the amplifier's gain; clipped means are biased");
-    if (!erroneous.empty())
-      problem("channels", "the board flags frames as errors of its converter: " + erroneous.text(),
-              "exclude these runs and record them again");
-    if (!pattern.empty())
-      problem("channels", "the board's test pattern, no measurements: " + pattern.text(),
-              "exclude these runs and record them again without the test pattern");
-    if (!overloaded.empty())
-      note("channels", "mean thrust outside the calibrated forces: " + overloaded.text(),
+    const ChannelFaults faults = channel_faults();
+    bool well = true;
+    const auto report = [&](const Names& names, const char* what, const char* advice) {
+      if (names.empty()) return;
+      problem("channels", what + names.text(), advice);
+      well = false;
+    };
+    report(faults.stuck, "stuck, never change: ", "check cell, amplifier and plug; record these runs again");
+    report(faults.dead, "dead, less noise than a converter has: ", "check cell, amplifier and plug");
+    report(faults.clipped, "clipped: ", "lower the amplifier's gain; clipped means are biased");
+    report(faults.flagged,
+           "the board flags frames as clipped: ", "lower the amplifier's gain; clipped means are biased");
+    report(faults.erroneous,
+           "the board flags frames as errors of its converter: ", "exclude these runs and record them again");
+    report(faults.pattern, "the board's test pattern, no measurements: ",
+           "exclude these runs and record them again without the test pattern");
+    if (!faults.overloaded.empty())
+      note("channels", "mean thrust outside the calibrated forces: " + faults.overloaded.text(),
            "calibrate over the range that is measured");
-    if (stuck.empty() && dead.empty() && clipped.empty() && flagged.empty() && pattern.empty())
-      good("channels", "none stuck, dead or clipped");
+    if (well) good("channels", "none stuck, dead or clipped");
   }
 
   void metadata() {
@@ -247,6 +224,36 @@ class Fitness : public Findings {
   }
 
  private:
+  ChannelFaults channel_faults() const {
+    ChannelFaults faults;
+    for (const Run& run : data_.runs) {
+      const auto statistics = data_.statistics.find(run.run);
+      if (statistics == data_.statistics.end() || !run.excluded.empty()) continue;
+      const auto raw = data_.raw.find(run.run);
+      if (raw != data_.raw.end())
+        if (const auto ledger = ledger_of(file_, raw->second.id)) faults.add_flags(run.run, *ledger);
+      const bool counts = raw != data_.raw.end() && is_counts(raw->second.format.type);
+      for (int rotor = 0; rotor < data_.info.rig.rotors; ++rotor)
+        add_faults(run, rotor, statistics->second, counts, faults);
+    }
+    return faults;
+  }
+
+  /// Of one channel, of counts or of volts.
+  void add_faults(const Run& run, int rotor, const RunStatistics& statistics, bool counts,
+                  ChannelFaults& faults) const {
+    const ChannelStatistics& channel = statistics.channels[static_cast<std::size_t>(rotor)];
+    const std::string name = fmt::format("{} channel {}", run.run, rotor + 1);
+    const bool thrust = run.kind == RunKind::kThrust;
+    if (channel.stuck())
+      faults.stuck.add(name);
+    else if (thrust && counts && channel.std_V < kDeadNoise_counts * data_.info.daq.volts_per_count())
+      faults.dead.add(name);
+    if (channel.clipped > 0) faults.clipped.add(with_share(name, channel.clipped, statistics.frames));
+    if (thrust && data_.certificate && data_.certificate->force(rotor + 1, channel.mean_V).extrapolated)
+      faults.overloaded.add(name);
+  }
+
   double lowest_calibrated_N() const {
     double lowest = 0;
     if (data_.certificate) {

@@ -1,7 +1,6 @@
 #include "analysis/health.h"
 
 #include "analysis/findings.h"
-#include "datasets/error.h"
 
 #include <algorithm>
 #include <iterator>
@@ -34,14 +33,15 @@ class Examination : public Findings {
     std::map<std::string, std::string> first;  // run of each hash
     std::size_t done = 0;
     for (const auto& [name, run] : data_.raw) {
-      try {
-        const std::string hash = hash_of(run);
-        if (!run.hash.empty() && hash != run.hash) changed.add(name);
-        if (excluded_.contains(name)) continue;
-        const auto [known, fresh] = first.emplace(hash, name);
-        if (!fresh && run.frames > 0) alike.add(fmt::format("{} and {}", known->second, name));
-      } catch (const StorageError&) {
+      const auto [hash, is_damaged] = hash_of_raw(file_, run);
+      if (is_damaged) {
         damaged.add(name);
+      } else {
+        if (!run.hash.empty() && hash != run.hash) changed.add(name);
+        if (!excluded_.contains(name)) {
+          const auto [known, fresh] = first.emplace(hash, name);
+          if (!fresh && run.frames > 0) alike.add(fmt::format("{} and {}", known->second, name));
+        }
       }
       if (progress) progress(++done, data_.raw.size());
     }
@@ -137,18 +137,6 @@ class Examination : public Findings {
   }
 
  private:
-  std::string hash_of(const RawRun& run) const {
-    struct Hash : FrameSink {
-      explicit Hash(const RawFormat& format) : hasher(format) {}
-      void frames(std::span<const std::byte> data) override { hasher.add(data); }
-      void gap(const Gap& gap) override { gaps.push_back(gap); }
-      RawHasher hasher;
-      std::vector<Gap> gaps;
-    } sink(run.format);
-    read_raw(file_, run, sink);
-    return sink.hasher.finish(sink.gaps);
-  }
-
   const CampaignFile& file_;
   const CampaignData& data_;
   std::set<std::string> excluded_;  // runs; nothing is derived from them

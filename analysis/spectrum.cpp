@@ -127,7 +127,6 @@ std::span<const double> WelchSpectrum::power(std::size_t channel) const {
 }
 
 // --- lines
-// -----------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -184,12 +183,6 @@ std::vector<SpectralLine> peaks(const WelchSpectrum& spectrum, std::size_t chann
   std::sort(found.begin(), found.end(),
             [](const auto& a, const auto& b) { return a.amplitude_V > b.amplitude_V; });
   return found;
-}
-
-/// Where a frequency appears after sampling.
-double folded(double frequency_hz, double rate_hz) {
-  const double rest = std::fmod(frequency_hz, rate_hz);
-  return std::min(rest, rate_hz - rest);
 }
 
 /// What a line may be, and how far it may be off: what follows from a multiple of the shaft's frequency is k

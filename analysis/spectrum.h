@@ -3,6 +3,8 @@
 
 #include "datasets/run_statistics.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -20,7 +22,8 @@ class WelchSpectrum {
   /// Consecutive frames, channel by channel within a frame, in volts less anything constant.
   void add(std::span<const float> frames);
 
-  /// Frames are missing here: no window reaches across.
+  /// Frames are missing here: no window reaches across, but among the first 8192 frames, before which their
+  /// length is not chosen.
   void interrupt();
 
   /// The run is over: averages of the power of bins 0 … window/2, channel after channel; empty for fewer than
@@ -45,6 +48,12 @@ class WelchSpectrum {
   std::vector<float> taper_;
   std::vector<double> power_;
 };
+
+/// Where a frequency appears after sampling.
+inline double folded(double frequency_hz, double rate_hz) {
+  const double rest = std::fmod(frequency_hz, rate_hz);
+  return std::min(rest, rate_hz - rest);
+}
 
 /// A line at the mains' frequency or one of its harmonics, by its name.
 inline bool is_mains(std::string_view name) { return name.starts_with("mains"); }

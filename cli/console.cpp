@@ -49,10 +49,7 @@ void remember_arguments(int argc, const char* const* argv) {
 
 const std::string& arguments() { return command_line; }
 
-std::string now_utc() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return format_utc(static_cast<double>(std::chrono::duration_cast<std::chrono::seconds>(now).count()));
-}
+std::string now_utc() { return format_utc(std::floor(utc_seconds())); }
 
 namespace {
 
@@ -145,6 +142,13 @@ void ProgressBar::show(const std::string& note) {
   const double elapsed_s = std::chrono::duration<double>(last_ - started_).count();
   const std::string text = fmt::format("{} for {}  {}", what_, duration_text(elapsed_s), note);
   tell(error_is_terminal() ? "\r\x1b[K" + text : text + "\n");
+}
+
+std::function<void(std::size_t done, std::size_t total)> show_on(ProgressBar& bar, const char* what) {
+  return [&bar, what](std::size_t done, std::size_t total) {
+    bar.show(static_cast<double>(done), static_cast<double>(total),
+             fmt::format("{} {} of {}", what, done, total));
+  };
 }
 
 std::string duration_text(double seconds) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -73,6 +75,9 @@ class ProgressBar {
   Clock::time_point last_{};
   bool drawn_ = false;
 };
+
+/// Shows what work says of itself: "run 3 of 12", of whatever `what` is. The bar must outlive the work.
+std::function<void(std::size_t done, std::size_t total)> show_on(ProgressBar& bar, const char* what = "run");
 
 /// "3 min 20 s"
 std::string duration_text(double seconds);

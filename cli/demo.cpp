@@ -86,21 +86,22 @@ class Demo {
 
   /// Shows the first runs of a recording and how far it is; the whole list goes into log.txt.
   int record(const std::vector<std::string>& words) const {
-    constexpr int kShown = 2;
+    constexpr std::size_t kShown = 2;
     std::ofstream log(path("log.txt"));
     std::FILE* recording = ::popen(announce(words).c_str(), "r");
     if (recording == nullptr) throw StorageError("the recording cannot be started", false);
-    int runs = 0, total = 0;
+    std::size_t runs = 0, total = 0;
     {
       ProgressBar bar("recording");
+      const auto show = show_on(bar);
       std::array<char, 4096> line{};
       while (std::fgets(line.data(), line.size(), recording) != nullptr) {
         const std::string text = line.data();
         log << text;
         const bool is_run = text.find(" frames, ") != std::string::npos;
         if (!is_run || ++runs <= kShown) fmt::print("{}", text);
-        if (total == 0 && std::sscanf(text.c_str(), "%*[^:]: %d of", &total) != 1) total = 0;
-        bar.show(runs, total, fmt::format("run {} of {}", runs, total));
+        if (total == 0 && std::sscanf(text.c_str(), "%*[^:]: %zu of", &total) != 1) total = 0;
+        show(runs, total);
       }
     }
     const int code = exit_code(::pclose(recording));

@@ -35,9 +35,7 @@ std::vector<Finding> look_at(const CampaignFile& file) {
         {Severity::kGood, "table", fmt::format("{} observations fit their schema", table.rows.size()), ""}};
   }
   ProgressBar bar("doctor");
-  return examine(file, read_campaign_data(file), [&bar](std::size_t done, std::size_t total) {
-    bar.show(static_cast<double>(done), static_cast<double>(total), fmt::format("run {} of {}", done, total));
-  });
+  return examine(file, read_campaign_data(file), show_on(bar));
 }
 
 void print(const std::vector<Finding>& findings) {

@@ -15,12 +15,6 @@ struct ExportOptions {
   std::string db, target, format = "folder", parts, model, terms;
 };
 
-Progress show_on(ProgressBar& bar) {
-  return [&bar](std::size_t done, std::size_t total) {
-    bar.show(static_cast<double>(done), static_cast<double>(total), fmt::format("run {} of {}", done, total));
-  };
-}
-
 int export_folder(const CampaignFile& file, const ExportOptions& options) {
   if (!options.parts.empty() || !options.model.empty() || !options.terms.empty())
     throw InputError(

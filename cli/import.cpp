@@ -34,11 +34,7 @@ int import_folder(const ImportVerbOptions& options) {
                     .allow_stuck = options.allow_stuck,
                     .summarizer = [](const CampaignInfo& info,
                                      const RawFormat& format) { return make_run_summarizer(info, format); },
-                    .progress =
-                        [&bar](std::size_t done, std::size_t total) {
-                          bar.show(static_cast<double>(done), static_cast<double>(total),
-                                   fmt::format("run {} of {}", done, total));
-                        }};
+                    .progress = show_on(bar)};
   const auto start = std::chrono::steady_clock::now();
   const ImportSummary summary = import_campaign_folder(options.source, options.db, how);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

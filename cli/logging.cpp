@@ -5,10 +5,10 @@
 #include "cli/console.h"
 #include "cli/live/book.h"
 #include "cli/live/run_alarms.h"
+#include "cli/run_warnings.h"
 #include "datasets/error.h"
 #include "datasets/locations.h"
 #include "datasets/open_space.h"
-#include "datasets/recorded_rate.h"
 #include "datasets/run_marks.h"
 
 #include <algorithm>
@@ -29,10 +29,6 @@ namespace {
 /// Text of a number as it goes into a cell.
 std::string cell(double value) { return fmt::format("{}", value); }
 
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 /// Of the next run: an import brings names and raw files of its own, which may be R0002 and raw/R0002.npy.
 std::string free_name(const CampaignFile& file) {
   const Sheet runs = file.sheet("runs").value_or(Sheet());
@@ -45,44 +41,6 @@ std::string free_name(const CampaignFile& file) {
     std::string name = fmt::format("R{:04}", number);
     if (!taken.contains(name) && !taken.contains("raw/" + name)) return name;
   }
-}
-
-/// Says what arrived and could not be used. True where it is a problem: what came twice is not.
-bool warn_of_unusable(const std::string& run, const Ledger& ledger) {
-  if (ledger.frames_stored == 0 && ledger.bytes_skipped > 0)
-    warn(fmt::format("run {}: {} bytes arrived that are no packets of version 1 (docs/wire-format.md)", run,
-                     ledger.bytes_skipped));
-  if (ledger.packets_corrupt > 0)
-    warn(
-        fmt::format("run {}: {} refused: a wrong checksum, a number that is not believed, or "
-                    "other frames under numbers that had passed",
-                    run,
-                    ledger.packets_corrupt == 1 ? "1 packet was"
-                                                : fmt::format("{} packets were", ledger.packets_corrupt)));
-  if (much_came_again(ledger))
-    warn(
-        fmt::format("run {}: {} frames came under numbers that had passed and were dropped; a board that "
-                    "restarts needs a new boot id",
-                    run, ledger.frames_duplicate));
-  return ledger.packets_corrupt > 0;
-}
-
-/// Says where the board's rate is not the campaign's. True where it is a problem.
-bool warn_of_rate(const std::string& run, const Ledger& ledger, double campaign_rate_hz) {
-  if (ledger.frames_stored > 0 && !ledger.board_rate_hz) {
-    warn(fmt::format(
-        "run {}: the board says no rate (0 ticks a second, or a frame); {:.3f} Hz, campaign.toml's, "
-        "is taken for it",
-        run, campaign_rate_hz));
-    return true;
-  }
-  if (!is_another_rate(ledger.board_rate_hz, campaign_rate_hz)) return false;
-  warn(fmt::format(
-      "run {}: the board samples at {:.3f} Hz, campaign.toml says {:.3f} Hz; by the board the run is "
-      "{:.3f} s long, but its spectrum and times go by campaign.toml",
-      run, *ledger.board_rate_hz, campaign_rate_hz,
-      static_cast<double>(ledger.frames_emitted) / *ledger.board_rate_hz));
-  return true;
 }
 
 /// What was received once does not come again: it is never written over, not even by the rest of its plan.
@@ -157,12 +115,8 @@ Logging::Logging(const LogOptions& options)
 int Logging::record(const PlannedRun& planned, const std::string& note, const LogWatch& watch) {
   doubt_place(planned);
   const std::string name = free_name(file_);
-  double start_s = now_s();
-  std::unique_ptr<PacketSource> board;
-  RunCells cells = {{"run", name},
-                    {"location", planned.location},
-                    {"repeat", fmt::format("{}", planned.repeat)},
-                    {"session", planned.session}};
+  double start_s = utc_seconds();
+  std::unique_ptr<PacketSource> board;  // the virtual rig's
   if (virtual_) {
     const VirtualRunRequest request =
         virtual_->request(planned, options_.speed_rpm.value_or(info_.rig.nominal_speed_rpm));
@@ -172,45 +126,56 @@ int Logging::record(const PlannedRun& planned, const std::string& note, const Lo
   } else {
     add_conditions({}, planned.kind);
   }
-  cells.emplace_back("start_utc", format_utc(start_s));
-  cells.emplace_back("raw", fmt::format("raw/{}.npy", name));
+  if (!options_.capture.empty() && !capture_.is_open()) capture_ = open_to_write(options_.capture);
+  const LogOutcome outcome = log(board ? *board : *source_, row(name, planned, start_s), planned.duration_s,
+                                 note.empty() ? name : note, watch);
+  if (watch.ended)
+    watch.ended(name, outcome);
+  else
+    mark_alarms(file_, name, alarms(planned, outcome));
+  print(name, planned, outcome);
+  const int code = warn_of_run(name, outcome, info_) ? kProblemFound : kWell;
+  if (capture_) return code;
+  warn(fmt::format("{}: cannot be written any more, is the disk full? The recording is in {} all the same",
+                   options_.capture, options_.db));
+  return kProblemFound;
+}
+
+/// The run as runs.csv has it.
+RunCells Logging::row(const std::string& name, const PlannedRun& planned, double start_s) const {
+  RunCells cells = {{"run", name},
+                    {"location", planned.location},
+                    {"repeat", fmt::format("{}", planned.repeat)},
+                    {"session", planned.session},
+                    {"start_utc", format_utc(start_s)},
+                    {"raw", fmt::format("raw/{}.npy", name)}};
   if (planned.kind == RunKind::kTare) cells.emplace_back("kind", "tare");
   if (planned.y_norm && planned.z_norm)
     cells.insert(cells.end(), {{"y_norm", cell(*planned.y_norm)}, {"z_norm", cell(*planned.z_norm)}});
   cells.insert(cells.end(), conditions_.begin(), conditions_.end());
   cells.insert(cells.end(), planned.own.begin(), planned.own.end());
   cells.emplace_back("source", options_.source);
+  return cells;
+}
 
-  if (!options_.capture.empty() && !capture_.is_open()) capture_ = open_to_write(options_.capture);
-  const LogSettings settings{.duration_s = planned.duration_s,
-                             .capture = capture_.is_open() ? &capture_ : nullptr,
-                             .watcher = watch.frames};
+LogOutcome Logging::log(PacketSource& source, const RunCells& cells, double duration_s,
+                        const std::string& note, const LogWatch& watch) {
+  const LogSettings settings{
+      .duration_s = duration_s, .capture = capture_.is_open() ? &capture_ : nullptr, .watcher = watch.frames};
   const auto measured = std::ranges::find(conditions_, "speed_rpm", &RunCells::value_type::first);
   const auto summarizer = [&](const CampaignInfo& info, const RawFormat& format) {
     return make_run_summarizer(
         measured == conditions_.end() ? info : at_speed(info, parse_number(measured->second)), format);
   };
-  LogOutcome outcome;
-  {
-    ProgressBar bar(note.empty() ? name : note);
-    if (watch.begun) watch.begun(cells);
-    outcome = log_run(
-        board ? *board : *source_, file_, cells, settings, summarizer,
-        [&](const LogProgress& progress) {
-          show(bar, progress);
-          if (watch.progress) watch.progress(progress);
-        },
-        stop_requested);
-  }
-  if (watch.ended)
-    watch.ended(name, outcome);
-  else
-    mark_alarms(file_, name, alarms(planned, outcome));
-  const int code = report(name, planned, outcome);
-  if (capture_) return code;
-  warn(fmt::format("{}: cannot be written any more, is the disk full? The recording is in {} all the same",
-                   options_.capture, options_.db));
-  return kProblemFound;
+  ProgressBar bar(note);
+  if (watch.begun) watch.begun(cells);
+  return log_run(
+      source, file_, cells, settings, summarizer,
+      [&](const LogProgress& progress) {
+        show(bar, progress);
+        if (watch.progress) watch.progress(progress);
+      },
+      stop_requested);
 }
 
 /// A label that is a slip of the pen: the run would be on no map.
@@ -294,8 +259,7 @@ void Logging::show(ProgressBar& bar, const LogProgress& progress) const {
                                                   : fmt::format(", ONLY {}", progress.instead)));
 }
 
-int Logging::report(const std::string& name, const PlannedRun& planned, const LogOutcome& outcome) const {
-  const Ledger& ledger = outcome.ledger;
+void Logging::print(const std::string& name, const PlannedRun& planned, const LogOutcome& outcome) const {
   std::string means = "no frames";
   if (!outcome.statistics.channels.empty()) {
     std::array<double, 4> volts{};
@@ -303,8 +267,8 @@ int Logging::report(const std::string& name, const PlannedRun& planned, const Lo
     means = means_text(volts);
   }
   fmt::print("{}  {} {} #{}  {}: {} frames, {} lost, {}\n", name, planned.session, planned.location,
-             planned.repeat, planned.kind == RunKind::kTare ? "tare" : "thrust", ledger.frames_stored,
-             ledger.frames_lost, means);
+             planned.repeat, planned.kind == RunKind::kTare ? "tare" : "thrust", outcome.ledger.frames_stored,
+             outcome.ledger.frames_lost, means);
   if (outcome.clock && !virtual_) {
     fmt::print(
         "      board clock: {:.5f} ± {:.5f} frames/s by this computer's clock over {}, drift {:+.2f} ± "
@@ -313,39 +277,6 @@ int Logging::report(const std::string& name, const PlannedRun& planned, const Lo
         outcome.clock->drift_ppm_h, outcome.clock->drift_interval_ppm_h);
   }
   std::fflush(stdout);
-  bool problem = outcome.state != RunState::kComplete;
-  if (problem) warn(fmt::format("run {} is partial: {}", name, ledger.end_reason));
-  if (ledger.frames_lost > 0) {
-    warn(
-        fmt::format("run {}: {} of {} frames lost ({} late, {} corrupt packets, {} reboots, {} silences); "
-                    "the ledger has where",
-                    name, ledger.frames_lost, ledger.frames_emitted, ledger.frames_late,
-                    ledger.packets_corrupt, ledger.reboots, ledger.silences));
-    problem = true;
-  }
-  problem |= warn_of_unusable(name, ledger);
-  if (ledger.frames_test_pattern > 0) {
-    warn(fmt::format("run {}: {} frames are the board's test pattern, no measurements", name,
-                     ledger.frames_test_pattern));
-    problem = true;
-  }
-  for (const auto& [frames, what] :
-       {std::pair(ledger.frames_adc_error, "errors of the converter"), {ledger.frames_clipped, "clipped"}}) {
-    if (frames == 0) continue;
-    warn(fmt::format("run {}: the board flags {} frames as {}", name, frames, what));
-    problem = true;
-  }
-  problem |= warn_of_rate(name, ledger, info_.daq.sample_rate_hz);
-  for (std::size_t c = 0;
-       c < outcome.statistics.channels.size() && c < static_cast<std::size_t>(info_.rig.rotors); ++c) {
-    const ChannelStatistics& channel = outcome.statistics.channels[c];
-    if (channel.clipped > 0)
-      warn(fmt::format("run {}: channel {} clipped in {} samples", name, c + 1, channel.clipped));
-    if (channel.stuck())
-      warn(fmt::format("run {}: channel {} is stuck at {:.4f} V", name, c + 1, channel.lowest_V));
-    problem |= channel.stuck() || channel.clipped > 0;
-  }
-  return problem ? kProblemFound : kWell;
 }
 
 std::vector<PlannedRun> read_plan(const std::string& path) {

@@ -89,7 +89,10 @@ class Logging {
   void add_conditions(const std::optional<InstrumentReadings>& shown, RunKind kind);
   std::string means_text(const std::array<double, 4>& volts) const;
   void show(ProgressBar& bar, const LogProgress& progress) const;
-  int report(const std::string& name, const PlannedRun& planned, const LogOutcome& outcome) const;
+  RunCells row(const std::string& name, const PlannedRun& planned, double start_s) const;
+  LogOutcome log(PacketSource& source, const RunCells& cells, double duration_s, const std::string& note,
+                 const LogWatch& watch);
+  void print(const std::string& name, const PlannedRun& planned, const LogOutcome& outcome) const;
 
   /// Where an error ends the call, a file that it made and recorded nothing to would only be in the way. It
   /// goes while file_ still holds the lock: a moment later it may be another recorder's.

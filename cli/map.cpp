@@ -85,9 +85,7 @@ WrittenMaps write_with_progress(const MapOptions& options, const TunnelMaps& map
                                 const std::string& provenance) {
   ProgressBar bar("map");
   return write_maps(options.out, maps,
-                    {.nodes = options.nodes, .provenance = provenance, .progress = [&](int done, int total) {
-                       bar.show(done, total, fmt::format("row {} of {}", done, total));
-                     }});
+                    {.nodes = options.nodes, .provenance = provenance, .progress = show_on(bar, "row")});
 }
 
 int run_map(const MapOptions& options) {

@@ -47,11 +47,7 @@ void keep_lines(const RunStatistics& stored, RunStatistics& computed) {
 /// True where all agreed.
 bool refresh_from_raw(const ReduceOptions& options, CampaignData& data) {
   ProgressBar bar("from raw");
-  auto computed =
-      statistics_from_raw(options.db, !options.no_spectra, [&bar](std::size_t done, std::size_t total) {
-        bar.show(static_cast<double>(done), static_cast<double>(total),
-                 fmt::format("run {} of {}", done, total));
-      });
+  auto computed = statistics_from_raw(options.db, !options.no_spectra, show_on(bar));
   const auto lines = disagreements(data.statistics, computed);
   for (const std::string& line : lines) warn(line);
   const bool anew = !options.no_spectra && !lines.empty();

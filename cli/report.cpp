@@ -20,9 +20,7 @@ struct ReportOptions {
 
 void write_page(const ReportOptions& options, const CampaignFile& file, const ReportSettings& settings) {
   ProgressBar bar("report");
-  const ReportData data = report_data(file, settings, [&bar](std::size_t done, std::size_t total) {
-    bar.show(static_cast<double>(done), static_cast<double>(total), fmt::format("run {} of {}", done, total));
-  });
+  const ReportData data = report_data(file, settings, show_on(bar));
   const std::string page = render_report(data.json);
   write_text(options.out, page);
   for (const AbsentSection& section : data.absent)
@@ -34,15 +32,11 @@ void write_page(const ReportOptions& options, const CampaignFile& file, const Re
 void write_all_figures(const ReportOptions& options, const CampaignFile& file,
                        const ReportSettings& settings) {
   ProgressBar bar("figures");
-  const WrittenFigures written =
-      write_figures(options.figures, file, settings,
-                    {.format = figure_format(options.format),
-                     .width_mm = options.width_mm,
-                     .command = arguments(),
-                     .progress = [&bar](std::size_t done, std::size_t total) {
-                       bar.show(static_cast<double>(done), static_cast<double>(total),
-                                fmt::format("figure {} of {}", done, total));
-                     }});
+  const WrittenFigures written = write_figures(options.figures, file, settings,
+                                               {.format = figure_format(options.format),
+                                                .width_mm = options.width_mm,
+                                                .command = arguments(),
+                                                .progress = show_on(bar, "figure")});
   for (const AbsentFigure& figure : written.absent)
     fmt::print("without {}: {}\n", figure.figure, figure.reason);
   fmt::print("{} figures, {:g} mm wide{}, and captions.md in {}\n", written.files.size() - 1,

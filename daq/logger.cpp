@@ -25,7 +25,6 @@ constexpr std::chrono::milliseconds kReopenPause{250};
 constexpr std::chrono::milliseconds kTick{20};
 constexpr std::chrono::milliseconds kProgressInterval{200};
 constexpr std::chrono::milliseconds kHeldUp{1000};
-constexpr double kChunk_s = 0.1;
 
 /// Reads on its own thread until the source ends or the queue closes, so that neither a slow disk nor a slow
 /// sum makes a device's small buffer overflow.

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <deque>
 #include <mutex>
+#include <new>
 #include <vector>
 
 #include <libusb-1.0/libusb.h>
@@ -122,6 +123,7 @@ UsbStream::UsbStream(std::shared_ptr<UsbHandle> handle, const UsbStreamSettings&
     transfer->buffer.resize(settings.transfer_bytes);
     transfer->state = state_.get();
     transfer->usb = libusb_alloc_transfer(0);
+    if (transfer->usb == nullptr) throw std::bad_alloc();
     libusb_fill_bulk_transfer(transfer->usb, handle_->get(), TRW_USB_STREAM_IN, transfer->buffer.data(),
                               static_cast<int>(transfer->buffer.size()), State::on_transfer, transfer.get(),
                               static_cast<unsigned>(settings.transfer_timeout.count()));

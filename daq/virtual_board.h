@@ -34,7 +34,8 @@ class VirtualBoard : public PacketSource {
   std::optional<std::uint64_t> ring_frames() const override { return ring_peak_.load(); }
   std::string name() const override { return "virtual"; }
 
-  /// Frames sampled so far, whatever became of them; while the board reboots it samples none.
+  /// Frames sampled so far, whatever became of them; while the board reboots it samples none. For tests,
+  /// which hold the ledger against it.
   std::uint64_t frames_sampled() const { return sampled_; }
 
  private:

@@ -17,6 +17,29 @@ namespace {
 
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
+// What a rig is built of, and how alike its parts are (σ): docs/virtual-rig.md. Unlike VirtualRigSettings,
+// nobody asks for another.
+
+// Cells of 1 kg behind amplifiers: 9.8 N gives 2.7 V of the converter's 3.3 V.
+constexpr double kZero_V = 0.34, kZeroScatter_V = 0.02;
+constexpr double kGain_V_per_N = 0.242, kGainScatter = 0.01;
+
+// The bench of cells goes over what the thesis calibrated, 0.5 to 1 kg; that of propellers has a rotor's
+// thrust at hover, 0.75 kg.
+constexpr double kLightest_N = 4.9, kHeaviest_N = 9.8;
+constexpr int kForcesPerCell = 10;
+constexpr double kHover_N = 7.4, kPropellerBenchScatter = 0.0015;
+constexpr int kTestsPerPropeller = 4;
+
+// Instruments on the wall (Pa; of relative humidity) and the supply, the thesis's 15 V.
+constexpr double kBarometer_Pa = 20, kHygrometer = 0.01;
+constexpr double kSupply_V = 15, kSupplyScatter_V = 0.01;
+
+constexpr double kMotorsApart_Hz = 0.02;  // one from another at the same set speed: 1.2 rev/min
+
+// Turbulence relative to the tunnel's, whose walls send a rotor's own wake back: the fewer, the calmer.
+constexpr double kOpenSpaceTurbulence = 0.5, kGroundTurbulence = 0.7, kCeilingTurbulence = 0.6;
+
 /// What is drawn for different things from one seed must not hang together: each has its own stream, named.
 std::mt19937_64 stream(std::uint64_t seed, const std::string& name) {
   std::uint64_t hash = 0xcbf29ce484222325u ^ seed;  // FNV-1a
@@ -41,12 +64,12 @@ Place place_of(const std::string& location) {
     return {thesis::kCtTunnelOrigin * (1 + published_thrust_change(point->y_norm, point->z_norm)),
             published_uneven_thrust(point->y_norm, point->z_norm)};
   }
-  if (location == "OS") return {thesis::kCtOpenSpace, 0, 0.5};
+  if (location == "OS") return {thesis::kCtOpenSpace, 0, kOpenSpaceTurbulence};
   if (const auto distance = distance_of(location, "GND"); distance && *distance > 0) {
-    return {thesis::kCtOpenSpace * published_ground_ratio(*distance), 0, 0.7};
+    return {thesis::kCtOpenSpace * published_ground_ratio(*distance), 0, kGroundTurbulence};
   }
   if (const auto distance = distance_of(location, "CEIL"); distance && *distance > 0) {
-    return {thesis::kCtOpenSpace * published_ceiling_ratio(*distance), 0, 0.6};
+    return {thesis::kCtOpenSpace * published_ceiling_ratio(*distance), 0, kCeilingTurbulence};
   }
   throw InputError(fmt::format(
       "the virtual rig does not know the location '{}' (H0V-3 to H5V3, OT, OS, GND1.25, CEIL0.75)",
@@ -183,7 +206,8 @@ VirtualRig::VirtualRig(const CampaignInfo& campaign, const VirtualRigSettings& s
   std::mt19937_64 engine = stream(settings.seed, "hardware");
   double sum = 0;
   for (std::size_t i = 0; i < cells_.size(); ++i) {
-    cells_[i] = {.zero_V = 0.34 + normal(engine, 0.02), .gain_V_per_N = 0.242 * (1 + normal(engine, 0.01))};
+    cells_[i] = {.zero_V = kZero_V + normal(engine, kZeroScatter_V),
+                 .gain_V_per_N = kGain_V_per_N * (1 + normal(engine, kGainScatter))};
     const double direction =
         i < 2 ? -settings.propeller_direction : settings.propeller_direction;  // 1, 2 CCW
     propeller_factor_[i] = 1 + direction + normal(engine, settings.propeller_within);
@@ -194,12 +218,12 @@ VirtualRig::VirtualRig(const CampaignInfo& campaign, const VirtualRigSettings& s
 
 Sheet VirtualRig::calibration_bench() const {
   std::mt19937_64 engine = stream(settings_.seed, "calibration bench");
-  std::uniform_real_distribution<double> force(4.9, 9.8);
+  std::uniform_real_distribution<double> force(kLightest_N, kHeaviest_N);
   Sheet sheet{.file = "calibration.csv",
               .columns = {"cell", "sequence", "applied_force_N", "voltage_V", "air_temperature_C"},
               .rows = {}};
   for (std::size_t cell = 0; cell < cells_.size(); ++cell) {
-    for (int point = 1; point <= 10; ++point) {
+    for (int point = 1; point <= kForcesPerCell; ++point) {
       const double true_N = force(engine);
       const double volts = cells_[cell].zero_V + cells_[cell].gain_V_per_N * true_N +
                            normal(engine, settings_.amplifier_noise_V);
@@ -217,8 +241,8 @@ Sheet VirtualRig::propeller_bench() const {
   Sheet sheet{
       .file = "propellers.csv", .columns = {"propeller", "rotor", "direction", "thrust_N"}, .rows = {}};
   for (std::size_t i = 0; i < propeller_factor_.size(); ++i) {
-    for (int repeat = 0; repeat < 4; ++repeat) {
-      const double thrust_N = 7.4 * propeller_factor_[i] * (1 + normal(engine, 0.0015));
+    for (int repeat = 0; repeat < kTestsPerPropeller; ++repeat) {
+      const double thrust_N = kHover_N * propeller_factor_[i] * (1 + normal(engine, kPropellerBenchScatter));
       sheet.rows.push_back({{fmt::format("HQ12x6-{}", i + 1), fmt::format("{}", i + 1), i < 2 ? "CCW" : "CW",
                              cell_text(thrust_N, 4)},
                             0});
@@ -234,10 +258,10 @@ InstrumentReadings VirtualRig::readings(const VirtualRunRequest& run) const {
   readings.speed_rpm =
       run.kind == RunKind::kTare ? 0 : conditions.speed_rpm + normal(engine, settings_.tachometer_rpm);
   readings.air_temperature_C = conditions.weather.air_temperature_C + normal(engine, settings_.thermometer_K);
-  readings.air_pressure_Pa = conditions.weather.air_pressure_Pa + normal(engine, 20);
+  readings.air_pressure_Pa = conditions.weather.air_pressure_Pa + normal(engine, kBarometer_Pa);
   readings.relative_humidity =
-      std::clamp(conditions.weather.relative_humidity + normal(engine, 0.01), 0.0, 1.0);
-  readings.supply_voltage_V = 15 + normal(engine, 0.01);
+      std::clamp(conditions.weather.relative_humidity + normal(engine, kHygrometer), 0.0, 1.0);
+  readings.supply_voltage_V = kSupply_V + normal(engine, kSupplyScatter_V);
   return readings;
 }
 
@@ -249,7 +273,7 @@ std::unique_ptr<PacketSource> VirtualRig::board(const VirtualRunRequest& run, do
   std::vector<Channel> channels;
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     // Four motors are never exactly alike; the tachometer reads their mean.
-    const double shaft_hz = conditions.speed_rpm / 60 + normal(engine, 0.02);
+    const double shaft_hz = conditions.speed_rpm / 60 + normal(engine, kMotorsApart_Hz);
     channels.emplace_back(cells_[i].zero_V + conditions.zero_shift_V[i], cells_[i].gain_V_per_N,
                           conditions.thrust_N[i], shaft_hz, conditions.turbulence, settings_, rate_hz,
                           engine);

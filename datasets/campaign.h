@@ -37,7 +37,8 @@ struct Tunnel {
   double height_m = 1.5;  // h_t
 };
 
-inline constexpr double kUsualMains_hz = 50;  // of most grids
+inline constexpr double kUsualMains_hz = 50;      // of most grids
+inline constexpr double kSpeedTolerance = 0.003;  // of the nominal speed, the thesis's ±15 rev/min
 
 struct Daq {
   double sample_rate_hz = 4000.0 / 3.0;
@@ -144,5 +145,8 @@ std::optional<double> parse_utc(std::string_view text);
 
 /// "2026-03-02T08:00:00Z", with milliseconds where they are not zero.
 std::string format_utc(double seconds);
+
+/// Now, in seconds since 1970, UTC.
+double utc_seconds();
 
 }  // namespace tunnelrig

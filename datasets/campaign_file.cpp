@@ -5,8 +5,8 @@
 #include "datasets/schema.h"
 #include "datasets/sqlite.h"
 
+#include <cerrno>
 #include <charconv>
-#include <chrono>
 #include <system_error>
 
 #include <fcntl.h>
@@ -65,16 +65,13 @@ void make_durable(const Database& database, const std::string& path) {
   database.execute("PRAGMA synchronous = FULL");
 }
 
-void sync_to_disk(const std::filesystem::path& path) {
+/// 0, or the error that says why `path` may not be on the disk.
+int sync_to_disk(const std::filesystem::path& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return;
-  ::fsync(fd);
+  if (fd < 0) return errno;
+  const int error = ::fsync(fd) == 0 ? 0 : errno;
   ::close(fd);
-}
-
-std::string now_utc() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return format_utc(std::chrono::duration<double>(now).count());
+  return error;
 }
 
 /// `name`.PROCESS.part: a staged campaign of some process, and no file of the user's.
@@ -276,7 +273,7 @@ std::int64_t CampaignFile::add_document(std::string_view kind, const Provenance&
             "INSERT INTO documents (kind, created_utc, program_version, arguments, inputs, document) "
             "VALUES (?, ?, ?, ?, ?, ?)")
       .bind(kind)
-      .bind(now_utc())
+      .bind(format_utc(utc_seconds()))
       .bind(provenance.program_version)
       .bind(provenance.arguments)
       .bind(provenance.inputs)
@@ -363,11 +360,17 @@ void StagedCampaign::publish() {
   file_->database_->execute("PRAGMA locking_mode = NORMAL");
   make_durable(*file_->database_, staged_.string());
   file_.reset();
-  sync_to_disk(staged_);
+  // Only what is on the disk may take the place of what is there.
+  if (const int failed = sync_to_disk(staged_); failed != 0) {
+    throw StorageError(fmt::format("{}: the new campaign cannot be written to the disk: {}", target_.string(),
+                                   std::generic_category().message(failed)),
+                       failed == ENOSPC || failed == EDQUOT);
+  }
   std::error_code error;
   for (const std::string_view suffix : {"-wal", "-shm"})
     std::filesystem::remove(with_suffix(target_, suffix), error);
   std::filesystem::rename(staged_, target_);
+  // Not every file system can sync a folder; a crash then brings the old file back, whole.
   sync_to_disk(std::filesystem::absolute(target_).parent_path());
 }
 

@@ -65,7 +65,7 @@ class CampaignFile {
   /// As `atomically`; false at once, and nothing done, where another connection is writing to the file.
   bool atomically_if_free(const std::function<void()>& work);
 
-  // --- what arrived as files -----------------------------------------------------------------------------
+  // --- what arrived as files
 
   std::optional<std::string> text(std::string_view name) const;  // "campaign.toml", "table.toml"
   void set_text(std::string_view name, std::string_view text);
@@ -94,7 +94,7 @@ class CampaignFile {
   std::vector<CalibrationPoint> calibration_points() const;
   std::vector<PropellerTest> propeller_tests() const;
 
-  // --- what was derived ----------------------------------------------------------------------------------
+  // --- what was derived
 
   std::int64_t add_document(std::string_view kind, const Provenance& provenance, std::string_view json);
   std::optional<Document> newest_document(std::string_view kind) const;
@@ -129,6 +129,8 @@ class StagedCampaign {
   StagedCampaign& operator=(const StagedCampaign&) = delete;
 
   CampaignFile& file() { return *file_; }
+
+  /// Throws StorageError, and leaves the target as it was, where the new file may not be on the disk.
   void publish();
 
  private:

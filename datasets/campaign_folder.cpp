@@ -24,7 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kChunk_s = 0.1;     // no blob holds more
 constexpr double kMostLost = 1e15;   // frames of one gap: some 20000 years
 constexpr double kLargest_V = 1e12;  // beyond it squares leave what statistics can hold
 

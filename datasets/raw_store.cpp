@@ -103,19 +103,6 @@ class GapCursor {
   std::size_t next_ = 0;
 };
 
-/// Hashes a run that is read back.
-class HashSink : public FrameSink {
- public:
-  explicit HashSink(const RawFormat& format) : hasher_(format) {}
-  void frames(std::span<const std::byte> data) override { hasher_.add(data); }
-  void gap(const Gap& gap) override { gaps_.push_back(gap); }
-  std::string finish() { return hasher_.finish(gaps_); }
-
- private:
-  RawHasher hasher_;
-  std::vector<Gap> gaps_;
-};
-
 void write_state(const Database& database, std::int64_t raw_run, RunState state, std::uint64_t frames,
                  const std::string& hash) {
   Statement(database, "UPDATE raw_runs SET state = ?, frames = ?, hash = ? WHERE id = ?")
@@ -280,22 +267,34 @@ void read_raw(const CampaignFile& file, const RawRun& run, FrameSink& sink) {
   cursor.rest();
 }
 
+StoredHash hash_of_raw(const CampaignFile& file, const RawRun& run) {
+  struct Hash : FrameSink {
+    explicit Hash(const RawFormat& format) : hasher(format) {}
+    void frames(std::span<const std::byte> data) override { hasher.add(data); }
+    void gap(const Gap& gap) override { gaps.push_back(gap); }
+    RawHasher hasher;
+    std::vector<Gap> gaps;
+  } sink(run.format);
+  bool damaged = false;
+  try {
+    read_raw(file, run, sink);
+  } catch (const StorageError&) {
+    damaged = true;
+  }
+  return {sink.hasher.finish(sink.gaps), damaged};
+}
+
 std::vector<std::string> close_interrupted_runs(CampaignFile& file) {
   std::vector<std::string> names;
   for (const RawRun& run : raw_runs(file)) {
     if (run.state != RunState::kRecording) continue;
-    HashSink sink(run.format);
-    try {
-      read_raw(file, run, sink);
-    } catch (const StorageError&) {
-      // What can be read of it has its hash. Who reads the run is told of the damage; the next one must not
-      // wait for it.
-    }
+    // Where it is damaged, who reads the run is told; the next one must not wait for it.
+    const StoredHash stored = hash_of_raw(file, run);
     Statement(file.database(), "UPDATE ledgers SET end_reason = ? WHERE raw_run = ?")
         .bind(kInterrupted)
         .bind(run.id)
         .run();
-    write_state(file.database(), run.id, RunState::kPartial, run.frames, sink.finish());
+    write_state(file.database(), run.id, RunState::kPartial, run.frames, stored.hash);
     names.push_back(run.run);
   }
   return names;

@@ -63,11 +63,13 @@ class FrameSink {
   virtual void gap(const Gap& gap) = 0;
 };
 
+inline constexpr double kChunk_s = 0.1;  // no blob holds more of a run
+
 /// Writes one run. Frames collect in memory until `commit`, which makes them and the ledger durable in one
 /// transaction (inside a staged campaign: joins its transaction).
 class RawWriter : public FrameSink {
  public:
-  /// `max_chunk_frames` is 0.1 s of frames at most. Throws InputError where the run exists already.
+  /// `max_chunk_frames` is kChunk_s of frames at most. Throws InputError where the run exists already.
   RawWriter(CampaignFile& file, const std::string& run, const RawFormat& format,
             std::size_t max_chunk_frames);
 
@@ -106,6 +108,13 @@ std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run);
 /// Plays a stored run into `sink`. Throws StorageError naming the run where a blob fails its CRC or one is
 /// missing.
 void read_raw(const CampaignFile& file, const RawRun& run, FrameSink& sink);
+
+/// The hash of what is stored of a run, as RawWriter makes it; of what can be read where it is damaged.
+struct StoredHash {
+  std::string hash;
+  bool damaged = false;  // a blob fails its CRC, or one is missing
+};
+StoredHash hash_of_raw(const CampaignFile& file, const RawRun& run);
 
 /// Runs left in state "recording" belong to a recorder that was killed: marks them partial, with their hash
 /// and, in the ledger, the reason. The file must be open for recording, so that nobody can still be writing

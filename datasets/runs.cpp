@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -343,6 +344,10 @@ std::string format_utc(double seconds) {
   std::array<char, 32> text{};
   std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &calendar);
   return fraction == 0 ? fmt::format("{}Z", text.data()) : fmt::format("{}.{:03}Z", text.data(), fraction);
+}
+
+double utc_seconds() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 }  // namespace tunnelrig

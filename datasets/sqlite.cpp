@@ -116,7 +116,8 @@ Statement& Statement::bind(std::string_view value) {
 }
 
 Statement& Statement::bind(std::span<const std::byte> value) {
-  check(sqlite3_bind_blob64(statement_, next_++, value.data(), value.size(), SQLITE_STATIC));
+  const void* data = !value.empty() ? static_cast<const void*>(value.data()) : "";  // as with text
+  check(sqlite3_bind_blob64(statement_, next_++, data, value.size(), SQLITE_STATIC));
   return *this;
 }
 

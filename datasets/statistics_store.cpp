@@ -1,5 +1,6 @@
 #include "datasets/statistics_store.h"
 
+#include "datasets/error.h"
 #include "datasets/sqlite.h"
 
 #include <cstring>
@@ -89,14 +90,20 @@ std::map<std::int64_t, RunStatistics> all_statistics(const CampaignFile& file) {
 }
 
 void read_windows(const CampaignFile& file, std::map<std::int64_t, RunStatistics>& statistics) {
-  Statement select(file.database(), "SELECT raw_run, window_s, means_V FROM run_windows");
+  Statement select(
+      file.database(),
+      "SELECT raw_run, window_s, means_V, run FROM run_windows JOIN raw_runs ON raw_runs.id = raw_run");
   while (select.step()) {
     const auto found = statistics.find(select.integer(0));
     if (found == statistics.end()) continue;
     const auto blob = select.blob(2);
+    if (blob.size() % sizeof(double) != 0)
+      throw StorageError(fmt::format("{}: run {}: the means of its windows are damaged", file.path().string(),
+                                     select.text(3)),
+                         false);
     found->second.window_s = select.real(1);
     found->second.window_means_V.resize(blob.size() / sizeof(double));
-    std::memcpy(found->second.window_means_V.data(), blob.data(), blob.size());
+    if (!blob.empty()) std::memcpy(found->second.window_means_V.data(), blob.data(), blob.size());
   }
 }
 

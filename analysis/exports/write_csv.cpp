@@ -1,4 +1,5 @@
 // CSV: a file per table, a file per recording, a file per array (docs/exports.md).
+#include "analysis/exports/folder_files.h"
 #include "analysis/exports/output_file.h"
 #include "analysis/exports/writer.h"
 #include "datasets/csv.h"
@@ -14,7 +15,6 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 namespace tunnelrig::exports {
 namespace {
@@ -165,18 +165,11 @@ class CsvWriter : public Writer {
     }
   }
 
-  void texts(const std::vector<Attachment>& texts) override {
-    fs::create_directory(folder_ / "texts");
-    for (const Attachment& document : texts)
-      write_file(folder_ / "texts" / (document.name + "." + document.extension), document.text);
-  }
+  void texts(const std::vector<Attachment>& texts) override { write_texts(folder_, texts); }
 
   void finish(const std::vector<std::pair<std::string, std::string>>& provenance) override {
     settle();
-    nlohmann::ordered_json json;
-    for (const auto& [key, text] : provenance) json[key] = text;
-    write_file(folder_ / "provenance.json",
-               json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+    write_provenance(folder_, provenance);
   }
 
  private:

@@ -1,4 +1,5 @@
 // NumPy: .npy files with a JSON of units beside each (docs/exports.md).
+#include "analysis/exports/folder_files.h"
 #include "analysis/exports/output_file.h"
 #include "analysis/exports/unicode.h"
 #include "analysis/exports/writer.h"
@@ -22,10 +23,6 @@ using NpyJson = nlohmann::ordered_json;
 const char* descr_of(Element element) {
   constexpr std::array<const char*, 6> kDescr = {"'<i2'", "'<u2'", "'<u4'", "'<u8'", "'<f4'", "'<f8'"};
   return kDescr[static_cast<std::size_t>(element)];
-}
-
-void write_json(const fs::path& path, const NpyJson& json) {
-  write_file(path, json.dump(1, ' ', false, NpyJson::error_handler_t::replace) + "\n");
 }
 
 /// A column as fixed-size cells, as a structured array holds it.
@@ -120,16 +117,10 @@ class NpyWriter : public Writer {
     write_json(folder_ / (group.name + ".json"), json);
   }
 
-  void texts(const std::vector<Attachment>& texts) override {
-    fs::create_directory(folder_ / "texts");
-    for (const Attachment& document : texts)
-      write_file(folder_ / "texts" / (document.name + "." + document.extension), document.text);
-  }
+  void texts(const std::vector<Attachment>& texts) override { write_texts(folder_, texts); }
 
   void finish(const std::vector<std::pair<std::string, std::string>>& provenance) override {
-    NpyJson json;
-    for (const auto& [key, text] : provenance) json[key] = text;
-    write_json(folder_ / "provenance.json", json);
+    write_provenance(folder_, provenance);
   }
 
  private:

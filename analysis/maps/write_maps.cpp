@@ -7,6 +7,7 @@
 #include "datasets/csv.h"
 
 #include <cmath>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -82,6 +83,19 @@ std::string scripts(const Drawing& drawing, const MapGrid& grid, const TunnelMap
   return script + gnuplot_script(picture, drawing.name + "_u95");
 }
 
+/// The new map is in its place by then: an old picture that stays is a reason to warn, not to fail.
+void remove_stale(const std::filesystem::path& folder, const std::vector<std::string>& pictures,
+                  std::optional<std::string>& warning) {
+  for (const std::string& picture : pictures) {
+    std::error_code error;
+    std::filesystem::remove(folder / picture, error);
+    if (!error) continue;
+    const std::string left = fmt::format("{} is of another map and cannot be removed: {}",
+                                         (folder / picture).string(), error.message());
+    warning = warning ? *warning + "; " + left : left;
+  }
+}
+
 }  // namespace
 
 WrittenMaps write_maps(const std::filesystem::path& folder, const TunnelMaps& maps,
@@ -126,7 +140,7 @@ WrittenMaps write_maps(const std::filesystem::path& folder, const TunnelMaps& ma
     }
   }
   written.files = staging.publish(names);
-  for (const std::string& picture : stale) std::filesystem::remove(folder / picture);
+  remove_stale(folder, stale, written.warning);
   return written;
 }
 

@@ -21,7 +21,7 @@ struct WriteSettings {
 struct WrittenMaps {
   DisturbanceMap map;
   std::vector<std::filesystem::path> files;
-  std::optional<std::string> warning;  // why there are no pictures
+  std::optional<std::string> warning;  // why there are no pictures, or which of another map are left
 };
 
 /// Writes into `folder`, which is made where it is missing:
@@ -30,8 +30,8 @@ struct WrittenMaps {
 ///   and the same as .png.
 /// Files of that name are replaced, all or none: everything is made in a scratch folder first. Without
 /// gnuplot there are no pictures, and the result says why; where the uncertainty is not known there is none
-/// of it. Older ones of another map are removed. Throws InputError where the folder cannot be written or a
-/// setting is wrong.
+/// of it. Older ones of another map are removed where they can be. Throws InputError where the folder cannot
+/// be written or a setting is wrong.
 WrittenMaps write_maps(const std::filesystem::path& folder, const TunnelMaps& maps,
                        const WriteSettings& settings = {});
 

@@ -13,11 +13,6 @@ constexpr std::chrono::seconds kStays{5};
 /// What a run's own frames say ends with the run; the disk and the tares do not.
 bool is_of_frames(const std::string& kind) { return kind != "disk" && kind != "tare_drift"; }
 
-std::string utc_now() {
-  return format_utc(
-      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count());
-}
-
 }  // namespace
 
 void Alarms::set(std::string_view kind, int rotor, bool wrong, const std::string& text, Time now) {
@@ -29,7 +24,7 @@ void Alarms::set(std::string_view kind, int rotor, bool wrong, const std::string
   }
   of_run_[key.first] = true;
   if (found == active_.end()) {
-    found = active_.emplace(key, Alarm{.since_utc = utc_now()}).first;
+    found = active_.emplace(key, Alarm{.since_utc = format_utc(utc_seconds())}).first;
     changed_ = true;
   }
   Alarm& alarm = found->second;

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -96,13 +97,15 @@ void Book::work() {
   Clock::duration pause = kLook;
   bool failed = false;
   while (true) {
+    bool asked = false;
     {
       std::unique_lock lock(mutex_);
       wake_.wait_for(lock, pause, [&] { return asked_ || stopping_; });
       if (stopping_) return;
-      if (!asked_ && !failed && !changed(*file)) continue;
-      asked_ = false;
+      asked = std::exchange(asked_, false);
     }
+    // Without the lock: `look` is called on the recording thread, which must not wait for a read of the file.
+    if (!asked && !failed && !changed(*file)) continue;
     const auto begin = Clock::now();
     try {
       if (!file) file.emplace(settings_.campaign, CampaignFile::Access::kRead);

@@ -43,7 +43,6 @@ class LiveFeed {
   LiveFeed& operator=(const LiveFeed&) = delete;
 
   // --- the logging thread
-  // -----------------------------------------------------------------------------------
 
   /// What a run's frames are to pass through (LogSettings::watcher).
   FrameSink& watcher() { return ring_; }
@@ -55,7 +54,6 @@ class LiveFeed {
   void place(const Position& position);
 
   // --- any thread
-  // -------------------------------------------------------------------------------------------
 
   Position position() const;
   /// Raises `flag` if `run` (empty: whichever) is being recorded, without one ending and another beginning in

@@ -83,8 +83,7 @@ std::optional<double> LiveFeed::tare_age_s(const Shared& now) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - here->second).count();
   const auto stored = now.cells->tares.find(session);
   if (stored == now.cells->tares.end() || stored->second.simulated) return {};
-  const auto utc = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(utc).count() - stored->second.end_s;
+  return utc_seconds() - stored->second.end_s;
 }
 
 /// Alarms of the whole rig.

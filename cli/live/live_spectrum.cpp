@@ -15,8 +15,7 @@ constexpr int kBladeHarmonics = 5;  // the last are aliases at the usual rate
 constexpr int kMainsHarmonics = 3;
 
 MarkedLine marked(const std::string& name, double frequency_hz, double rate_hz) {
-  const double rest = std::fmod(frequency_hz, rate_hz);
-  return {name, frequency_hz, std::min(rest, rate_hz - rest), frequency_hz > rate_hz / 2};
+  return {name, frequency_hz, folded(frequency_hz, rate_hz), frequency_hz > rate_hz / 2};
 }
 
 std::string harmonic(const char* name, int k) { return k == 1 ? name : fmt::format("{} ×{}", name, k); }
@@ -46,10 +45,11 @@ LiveSpectrum live_spectrum(const FrameWindow& frames, const Scale& scale, const 
     std::transform(power.begin(), power.end(), std::back_inserter(amplitude),
                    [](double value) { return std::sqrt(value); });
     spectrum.amplitude.push_back(std::move(amplitude));
-    const double seen_hz =
-        find_lines(welch, c, rate_hz,
-                   {.shaft_hz = info.rig.nominal_speed_rpm / 60, .blades = info.rig.blades})
-            .shaft_hz;
+    const double seen_hz = find_lines(welch, c, rate_hz,
+                                      {.shaft_hz = info.rig.nominal_speed_rpm / 60,
+                                       .blades = info.rig.blades,
+                                       .mains_hz = info.daq.mains_hz})
+                               .shaft_hz;
     if (seen_hz > 0) shafts.push_back(seen_hz);
   }
   if (!shafts.empty()) {

@@ -8,10 +8,9 @@
 
 namespace tunnelrig::live {
 
-inline constexpr double kSpeedTolerance = 0.003;  // of the nominal speed, the thesis's ±15 rev/min
-inline constexpr double kTareDrift_N = 0.05;      // 0.7 % of a rotor's thrust at hover
-inline constexpr double kTareDrift_V = 0.0125;    // before a calibration: the same for cells of 0.25 V/N
-inline constexpr double kDiskLow_B = 500e6;       // a dozen hours of the rig
+inline constexpr double kTareDrift_N = 0.05;    // 0.7 % of a rotor's thrust at hover
+inline constexpr double kTareDrift_V = 0.0125;  // before a calibration: the same for cells of 0.25 V/N
+inline constexpr double kDiskLow_B = 500e6;     // a dozen hours of the rig
 
 /// Kinds, "clipping;loss", from all of the run's frames, and `seen` while it was recorded (kinds likewise).
 std::string alarms_of(const LogOutcome& outcome, const Scale& scale, const CampaignInfo& info,

@@ -26,20 +26,17 @@ class FrameRing : public FrameSink {
   explicit FrameRing(std::size_t frames);
 
   // --- the recording thread
-  // ---------------------------------------------------------------------------------
 
   void begin_run();
   void frames(std::span<const std::byte> data) override;  // int16 × 4
   void gap(const Gap& gap) override;
 
   // --- the watching thread
-  // ----------------------------------------------------------------------------------
 
   /// Appends what has come to `frames`.
   void take(std::vector<LiveFrame>& frames);
 
   // --- any thread
-  // -------------------------------------------------------------------------------------------
 
   /// Number of runs begun: frames of an earlier one are history.
   std::uint32_t run() const { return run_.load(std::memory_order_relaxed); }

@@ -1,4 +1,5 @@
-// Reader of LIDAR logs in CARMEN's text format.
+// Reader of LIDAR logs in CARMEN's text format: published scans, which the tests hold the matcher against. No
+// verb reads one.
 #pragma once
 
 #include "flight/lidar/scan.h"

@@ -1,4 +1,5 @@
-// What no unbiased matcher can do better than.
+// What no unbiased matcher can do better than: tests and benchmarks hold the matcher against it, no flight
+// needs it.
 #pragma once
 
 #include "flight/lidar/scan.h"

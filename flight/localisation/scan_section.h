@@ -1,4 +1,5 @@
-// A scan as the reference of other scans: the outline of what it saw.
+// A scan as the reference of other scans: the outline of what it saw. For the tests on published scans; the
+// tunnel's section is known.
 #pragma once
 
 #include "flight/lidar/scan.h"

@@ -113,6 +113,19 @@ TEST_F(Health, AnOldCertificateAndAnOpenLedger) {
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("loss ledger: emitted is not stored plus lost in R1"));
 }
 
+/// Channels are well or have a problem, never both.
+TEST_F(Health, AConverterThatErredIsNotSaidToBeWell) {
+  import();
+  calibrate_file();
+  EXPECT_THAT(found(Severity::kGood), HasSubstr("channels: none stuck, dead or clipped"));
+  const Database database((folder / "c.db").string(), SQLITE_OPEN_READWRITE);
+  database.execute(
+      "INSERT INTO ledgers VALUES (1, 400, 400, 0, 0, 0, 0, 0, 0, 8, 0, 0, 1, 0, NULL, NULL, NULL, NULL, "
+      "'complete', 'tcp:x', 0, 0)");
+  EXPECT_THAT(found(Severity::kProblem), HasSubstr("errors of its converter: R1 (2 %)"));
+  EXPECT_THAT(found(Severity::kGood), testing::Not(HasSubstr("channels: ")));
+}
+
 TEST_F(Health, OfALedgerWithWhatCouldNotBeUsed) {
   import();
   const Database database((folder / "c.db").string(), SQLITE_OPEN_READWRITE);

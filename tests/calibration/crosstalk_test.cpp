@@ -152,7 +152,7 @@ TEST(Crosstalk, ReadingNamesFileLineAndColumn) {
   EXPECT_THAT(of("fx,fy,sx,sy\n0,1,1,2\n0,1,-1e300,2\n"), HasSubstr("cell.csv:3: column sx: -1e+300"));
 }
 
-// --- FARE-KE (telenaco/FARE-KE): three three-axis cells, measured -----------------------------------------
+// --- FARE-KE (telenaco/FARE-KE): three three-axis cells, measured
 
 CrosstalkTable fareke_cell(int cell) {
   const auto path = test::shared_data() / fmt::format("fareke_load_cells/cell{}.csv", cell);

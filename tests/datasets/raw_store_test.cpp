@@ -228,5 +228,21 @@ TEST_F(RawStore, StatisticsComeBackAsStored) {
   EXPECT_FALSE(read.channels[1].shaft_hz.has_value());
 }
 
+/// A blob of whole numbers of volts or none at all; anything else is damage, not something to be read past.
+TEST_F(RawStore, WindowsOfADamagedFileAreRefused) {
+  const RawWriter writer(file, "R1", {}, 100);
+  store_statistics(file, writer.id(), {.hash = "xxh3:0", .channels = {{.mean_V = 1}}, .window_s = 0.25});
+  auto all = all_statistics(file);
+  read_windows(file, all);
+  EXPECT_TRUE(all.at(writer.id()).window_means_V.empty());
+  file.database().execute("UPDATE run_windows SET means_V = zeroblob(21)");
+  try {
+    read_windows(file, all);
+    FAIL() << "21 bytes were read as numbers of 8";
+  } catch (const StorageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("run R1: the means of its windows are damaged"));
+  }
+}
+
 }  // namespace
 }  // namespace tunnelrig

@@ -188,7 +188,6 @@ double UsbBus::processor_s() {
 }
 
 // --- everything below with the lock held, but for work() and on_ioctl()
-// -------------------------------------------
 
 void UsbBus::show_ready(bool ready) {
   if (gate_ < 0 || ready != gate_full_) return;  // a full FIFO is not writable: nothing to reap

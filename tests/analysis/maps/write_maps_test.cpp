@@ -137,6 +137,18 @@ TEST(WriteMaps, WithoutGnuplotThereIsAWarningAndEverythingElse) {
   EXPECT_TRUE(std::filesystem::exists(folder / "notes.txt"));
 }
 
+/// By then the new map is in its place: to fail would deny it.
+TEST(WriteMaps, AnOldPictureThatCannotBeRemovedIsAWarning) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "delta_ct.svg");
+  write_text(folder / "delta_ct.svg" / "notes.txt", "a folder where a picture was");
+  const WrittenMaps written = write_maps(folder.path(), example(), without_pictures());
+  EXPECT_EQ(written.files.size(), 5u);
+  ASSERT_TRUE(written.warning);
+  EXPECT_THAT(*written.warning, HasSubstr("/nonexistent/gnuplot is not installed"));
+  EXPECT_THAT(*written.warning, HasSubstr("delta_ct.svg is of another map and cannot be removed"));
+}
+
 TEST(WriteMaps, AProgramThatFailsIsNamedWithItsReason) {
   const test::TemporaryFolder folder;
   WriteSettings settings;
