@@ -132,7 +132,7 @@ std::string no_more_than_a_line(const AdoptedEffect& adopted, const Observations
 struct Refuted {
   std::vector<Term> terms;
   std::vector<std::string> why;  // of each of `terms`
-  bool beyond = false;           // of one of them what is physical, or was seen: it never stays
+  bool beyond = false;           // of one of them what is physical, was seen, or curves say: it never stays
   bool structure = false;        // of one of them the data have, in another shape
   bool all = false;
   bool any() const { return all || !terms.empty(); }
@@ -185,9 +185,9 @@ Refuted refuted(const Explanation& explanation, const Observations& observations
   for (auto& [adopted, why] : against) {
     result.terms.push_back(adopted->term);
     result.why.push_back(std::move(why));
-    result.beyond |= adopted->at_bound || !no_more_than_a_line(*adopted, observations).empty();
-    result.structure |= adopted->bends_away || adopted->anywhere ||
-                        !contradiction(*adopted, explanation, observations).empty();
+    result.beyond |= adopted->at_bound || !no_more_than_a_line(*adopted, observations).empty() ||
+                     !contradiction(*adopted, explanation, observations).empty();
+    result.structure |= adopted->bends_away || adopted->anywhere;
   }
   result.all =
       against.empty() && refutable && (curves_do_better(explanation) || baseline_does_better(explanation));

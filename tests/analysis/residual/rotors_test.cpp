@@ -61,7 +61,7 @@ TEST_F(Rotors, WhatTwoDoIsNoNameOfAll) {
     y.rightCols(2).colwise() -= 30 * size * kRunSigma * wind.cwiseAbs2();
     test::set_y(o, y);
     const Explanation e = explained(o);
-    EXPECT_EQ(names(e), "") << explanation_text(e);
+    EXPECT_THAT(names(e), testing::Not(testing::HasSubstr("axial_wind"))) << explanation_text(e);
     ASSERT_FALSE(e.unknown.empty());
     EXPECT_EQ(e.unknown[0].covariate, "tunnel_airspeed_m_s");
   }
