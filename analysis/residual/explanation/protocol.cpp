@@ -21,11 +21,6 @@ using Eigen::MatrixXd;
 constexpr int kFewestBlocks = 6;
 constexpr std::size_t kFewestOpenBlocks = 4;  // of six, the seal leaves as many
 
-/// Response per unit of y.
-double scale_of(const Observations& observations) {
-  return observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
-}
-
 /// Whether the sealed runs speak against a model: they are predicted clearly worse than without it, and worse
 /// than either expects of itself (gross runs among the open ones are taken for scatter). Where an effect does
 /// little in them (they lie at its reference) it is chance whether the error grows.
@@ -115,7 +110,7 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
   set_interval(observations, errors, {}, settings.seed, explanation.before);
   explanation.after = explanation.before;
   explanation.detectable =
-      scale_of(observations) *
+      observations.response_per_y() *
       detectable_by_one(MixedModel(observations, rows, fit.variances.ratio), fit.variances, settings.alpha);
   // Too few blocks for an effect are enough to see a typing error.
   const HeldOutErrors fitted = score(observations, fit, rows, rows);
@@ -174,9 +169,9 @@ void report_search(const Attribution& found, const Observations& observations, c
   warn_of_bounds(observations, found, explanation);
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
-  explanation.detectable = found.detectable_sigma * scale_of(observations);
+  explanation.detectable = found.detectable_sigma * observations.response_per_y();
   for (const auto& [name, sigma] : found.detectable_by_effect)
-    explanation.detectable_by_effect[name] = sigma * scale_of(observations);
+    explanation.detectable_by_effect[name] = sigma * observations.response_per_y();
 }
 
 /// Sealed runs that a model can be asked for; which are not is said.

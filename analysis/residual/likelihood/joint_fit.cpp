@@ -238,10 +238,9 @@ MatrixXd on_baseline(const Observations& observations, const MatrixXd& residual,
     Eigen::RowVectorXd constant =
         count(group) > 0 ? Eigen::RowVectorXd(sum.row(group) / count(group)) : overall;
     if (observations.is_line()) constant.setZero();
-    predicted.row(row) = observations.multiplicative
-                             ? Eigen::RowVectorXd(observations.known.row(row).array() *
-                                                  (constant + added.row(row)).array().exp())
-                             : Eigen::RowVectorXd(constant + added.row(row));
+    Eigen::ArrayXXd y = constant + added.row(row);
+    if (observations.multiplicative) y = y.exp();
+    predicted.row(row) = observations.known.row(row).array() * y;
   }
   return predicted;
 }
@@ -257,10 +256,10 @@ std::vector<MatrixXd> acted_on(const Observations& observations, const std::vect
   }
   result.resize(terms.size());
   MatrixXd made = predicted;
-  for (const MatrixXd& each : own) made -= each;
+  for (const MatrixXd& each : own) made -= each.cwiseProduct(observations.known);
   for (const std::size_t t : order_of_action(terms)) {
     result[t] = made;
-    made += own[t];
+    made += own[t].cwiseProduct(observations.known);
   }
   return result;
 }

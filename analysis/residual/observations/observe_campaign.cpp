@@ -1,7 +1,7 @@
-#include "analysis/conventions.h"
 #include "analysis/misread_runs.h"
 #include "analysis/reduction.h"
 #include "analysis/residual/observations/campaign_conditions.h"
+#include "analysis/residual/observations/campaign_response.h"
 #include "analysis/spectrum.h"
 #include "datasets/error.h"
 #include "datasets/locations.h"
@@ -25,22 +25,6 @@ constexpr const char* kDuration = "duration_s";   // of a run whose thrusts came
 constexpr const char* kOpenSpace = "open space";  // group of all its runs
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-struct Source {
-  const CampaignData& data;
-  const Reduction& reduction;
-  std::vector<std::size_t> order;  // of reduction.runs, by time
-
-  Index rows() const { return static_cast<Index>(order.size()); }
-  const RunCoefficients& coefficients(Index row) const {
-    return reduction.runs[order[static_cast<std::size_t>(row)]];
-  }
-  const Run& run(Index row) const { return data.runs[coefficients(row).run]; }
-  const RunStatistics* statistics(Index row) const {
-    const auto found = data.statistics.find(run(row).run);
-    return found == data.statistics.end() || found->second.frames == 0 ? nullptr : &found->second;
-  }
-};
 
 /// cos(π j (w + ½)/W) coefficients of a run's windows, in y's scale: volts times `scale`.
 void set_course(const RunStatistics& statistics, Index row, Index channel, double scale,
@@ -70,7 +54,7 @@ void set_course(const RunStatistics& statistics, Index row, Index channel, doubl
 }
 
 /// Where every run has windows enough, what happened within it.
-void add_courses(const Source& source, Observations& result) {
+void add_courses(const CampaignSource& source, Observations& result) {
   for (Index row = 0; row < source.rows(); ++row) {
     const RunStatistics* statistics = source.statistics(row);
     if (statistics == nullptr ||
@@ -81,7 +65,7 @@ void add_courses(const Source& source, Observations& result) {
   for (Index row = 0; row < source.rows(); ++row) {
     for (Index c = 0; c < result.channels(); ++c) {
       const double per_volt = result.response == "thrust" ? result.newtons_per_volt(c) : 1;
-      const double scale = result.multiplicative ? per_volt / result.value(row, c) : per_volt;
+      const double scale = per_volt / (result.multiplicative ? result.value(row, c) : result.known(row, c));
       set_course(*source.statistics(row), row, c, scale, result.shape);
     }
   }
@@ -109,7 +93,7 @@ void add_sheet_covariates(const Source& source, Observations& result) {
 }
 
 /// Columns of texts: which battery, which blades.
-void add_texts(const Source& source, Observations& result) {
+void add_texts(const CampaignSource& source, Observations& result) {
   std::set<std::string> names;
   for (Index row = 0; row < source.rows(); ++row)
     for (const auto& [name, text] : source.run(row).labels)
@@ -127,7 +111,7 @@ void add_texts(const Source& source, Observations& result) {
 
 /// Hours since the session's first run, hour of the day, the run's number, and the trend of the air's
 /// temperature.
-void add_derived_covariates(const Source& source, Observations& result) {
+void add_derived_covariates(const CampaignSource& source, Observations& result) {
   const Index n = source.rows();
   std::vector<double> first(result.block_name.size(), std::numeric_limits<double>::infinity());
   for (const Run& run : source.data.runs) {  // a tare may have begun the session
@@ -183,7 +167,7 @@ std::map<std::string, std::set<double>> starts_s(const CampaignData& data) {
   return result;
 }
 
-void set_belonging(const Source& source, Observations& result) {
+void set_belonging(const CampaignSource& source, Observations& result) {
   std::map<std::string, int> last;
   const std::map<std::string, std::set<double>> all_starts_s = starts_s(source.data);
   for (Index row = 0; row < source.rows(); ++row) {
@@ -202,7 +186,7 @@ void set_belonging(const Source& source, Observations& result) {
   }
 }
 
-void add_places(const Source& source, Observations& result) {
+void add_places(const CampaignSource& source, Observations& result) {
   Eigen::VectorXd tunnel = Eigen::VectorXd::Zero(source.rows()), y = tunnel, z = tunnel;
   for (Index row = 0; row < source.rows(); ++row) {
     const Run& run = source.run(row);
@@ -250,21 +234,16 @@ Response response_of(const Source& source, const std::string& name, const Eigen:
           [](Index, Index) { return 1.0; }};
 }
 
-void set_response(const Source& source, const Response& response, Observations& result) {
-  result.unit = response.unit;
-  result.value.resize(source.rows(), response.channels);
-  result.known.resize(source.rows(), response.channels);
-  for (Index row = 0; row < source.rows(); ++row)
-    for (Index c = 0; c < response.channels; ++c) {
-      result.value(row, c) = response.value(row, c);
-      if (std::abs(result.value(row, c)) > kLargestResponse)
-        throw InputError::at("runs.csv", source.run(row).line, "the response {} is {:g}, beyond ±{:g}",
-                             result.response, result.value(row, c), kLargestResponse);
-      result.known(row, c) = response.known(row, c);
-    }
-  result.multiplicative = result.value.minCoeff() > 0;
-  result.y =
-      result.multiplicative ? MatrixXd((result.value.array() / result.known.array()).log()) : result.value;
+/// Of the conditions that a run cannot do without; of the others no run is left out.
+void say_what_lacks_temperature(const CampaignData& data, Observations& result) {
+  const auto lack = [](const Run& run) {
+    return run.kind == RunKind::kThrust && run.excluded.empty() && !run.number("air_temperature_C");
+  };
+  const auto missing = std::ranges::count_if(data.runs, lack);
+  if (missing == 0) return;
+  const auto runs = std::ranges::count(data.runs, RunKind::kThrust, &Run::kind);
+  result.left_out_for["air_temperature_C"] = fmt::format(
+      "missing in {} of {} runs, which are left out: without it there is no density", missing, runs);
 }
 
 /// A few runs below zero where all others pull are errors, and would make the whole model additive.
@@ -288,7 +267,7 @@ void leave_out_against_sign(Source& source, const Response& response, Observatio
 
 Observations observe(const CampaignData& data, const ObservationChoice& choice, bool all_runs) {
   const Reduction reduction = reduce_runs(data, {});
-  Source source{data, reduction, std::vector<std::size_t>(reduction.runs.size())};
+  CampaignSource source{data, reduction, std::vector<std::size_t>(reduction.runs.size())};
   std::iota(source.order.begin(), source.order.end(), 0U);
   std::stable_sort(source.order.begin(), source.order.end(), [&](std::size_t a, std::size_t b) {
     return data.runs[reduction.runs[a].run].start_s < data.runs[reduction.runs[b].run].start_s;
@@ -306,7 +285,7 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
     for (int c = 0; c < data.info.rig.rotors; ++c)
       result.newtons_per_volt(c) = 1 / (data.certificate->cells[static_cast<std::size_t>(c)].gain_V_per_N *
                                         data.certificate->propellers.factor(c));
-  const Response response = response_of(source, result.response, result.newtons_per_volt);
+  const CampaignResponse response = response_of(source, result.response, result.newtons_per_volt);
   if (result.response != "thrust")
     result.newtons_per_volt.setOnes();  // volts, and whatever else, as they are
   if (!all_runs) leave_out_against_sign(source, response, result);
@@ -350,6 +329,7 @@ Observations observe_campaign(const CampaignData& data, const ObservationChoice&
   if (!(result.value.maxCoeff() > result.value.minCoeff()))
     throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain",
                                  result.response));
+  warn_of_constant_rotors(result);
   for (std::string& misread : in_words(misread_runs(data))) result.left_out.push_back(std::move(misread));
   return result;
 }
