@@ -162,16 +162,46 @@ CanBeFound::CanBeFound(const Observations& observations)
       // NOLINTNEXTLINE(clang-analyzer-optin.cplusplus.UninitializedObject)
       has_evidence_(observations, baseline_) {}
 
+/// The first row in which the first way has no value, where none of them has one in all rows.
+std::optional<Index> CanBeFound::undefined_in_all(const std::vector<Term>& ways) const {
+  std::optional<Index> first;
+  for (const Term& way : ways) {
+    const auto row = has_evidence_.undefined(way);
+    if (!row) return {};
+    if (!first) first = row;
+  }
+  return first;
+}
+
+/// Whether it does something within a location, but not to first order.
+bool CanBeFound::is_flat_at_zero(Term way) const {
+  constexpr double kRounding = 1e-9;
+  const EffectParameter& amplitude = way.effect->parameters[0];
+  const Eigen::MatrixXd predicted =
+      predict_response(observations_, {terms_of_theory(observations_), {}}, rows_);
+  if (!respond(way, observations_, predicted).derivative[0][0].isZero(0)) return false;
+  way.parameters[0] = amplitude.upper > 0 ? amplitude.upper : amplitude.lower;
+  Components components(1 + observations_.shape.size(),
+                        Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
+  components[0] = respond(way, observations_, predicted).value[0];
+  return components[0].cwiseAbs().maxCoeff() > kRounding && baseline_.sees(components);
+}
+
 Testability CanBeFound::operator()(const Effect& effect) const {
   Testability can = testability(effect, observations_);
   if (!can.ok()) return can;
   const std::vector<Term> ways = ways_to_try(effect, observations_, rows_);
   if (ways.empty())
     can.reason = "there are too few blocks on both sides of any step";
-  else if (const auto row = has_evidence_.undefined(ways[0]))
+  else if (const auto row = undefined_in_all(ways))
     can.reason = no_value_in_words(effect, observations_, *row);
   else if (std::none_of(ways.begin(), ways.end(), std::cref(has_evidence_)))
-    can.reason = effect.of_zero && has_tares(observations_, effect) ? "the tares take it off"
+    can.reason = std::ranges::any_of(ways, [&](const Term& way) { return is_flat_at_zero(way); })
+                     ? fmt::format(
+                           "its derivative by {0} is 0 where {0} is 0, and it is sought by that: let the "
+                           "force change in proportion to a small {0}",
+                           effect.parameters[0].name)
+                 : effect.of_zero && has_tares(observations_, effect) ? "the tares take it off"
                  : observations_.from_table
                      ? "it does not vary within any group beside the baseline, which absorbs it"
                      : "it does not vary within any location, so the location's coefficient absorbs it";

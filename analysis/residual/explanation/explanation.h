@@ -146,6 +146,9 @@ class CanBeFound {
   Testability operator()(const Effect& effect) const;
 
  private:
+  std::optional<Eigen::Index> undefined_in_all(const std::vector<Term>& ways) const;
+  bool is_flat_at_zero(Term way) const;
+
   const Observations& observations_;
   std::vector<int> rows_;
   MixedModel baseline_;
