@@ -232,6 +232,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   if (const Covariate* covariate = observations.find(result.condition)) {
     result.covariate_unit = covariate->unit;
     if (covariate->derived) result.covariate = column_behind(covariate->name);
+    result.collinear_with = collinear_with(observations, *covariate);
   }
   const Curve curve = as_drawn(observations, found.curve, rows);
   std::vector<Components> columns = fit.linear.columns;

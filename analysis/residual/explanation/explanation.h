@@ -72,11 +72,12 @@ struct UnknownStructure {
   double p_value = 1;
   double amplitude = 0;  // half of peak to peak, unit of the response
   std::vector<ShapePoint> shape;
-  bool levels = false;                  // the shape is one of few values, and nothing lies between them
-  std::vector<std::string> labels;      // of a column of texts: x = i + 1 stands for labels[i]
-  std::vector<std::string> instead_of;  // effects over this covariate that do not follow it
-  bool by_sealed_too = false;           // the open blocks alone do not show it
-  bool in_some_runs = false;            // found in those that have the condition
+  bool levels = false;                      // the shape is one of few values, and nothing lies between them
+  std::vector<std::string> labels;          // of a column of texts: x = i + 1 stands for labels[i]
+  std::vector<std::string> instead_of;      // effects over this covariate that do not follow it
+  bool by_sealed_too = false;               // the open blocks alone do not show it
+  bool in_some_runs = false;                // found in those that have the condition
+  std::vector<std::string> collinear_with;  // other conditions that it may be as well
   std::vector<Term> could_be;  // names that go with it so nearly, or come so late, that none is given
 
   /// Whether it is a curve that the model can have, and errors can be given with.
@@ -84,6 +85,8 @@ struct UnknownStructure {
     return !by_sealed_too && !in_some_runs && !shape.empty() && covariate != "session";
   }
 };
+
+inline constexpr const char* kStructure = "structure";  // what has no name, over the column that is `missing`
 
 struct Untestable {
   std::string effect, reason;

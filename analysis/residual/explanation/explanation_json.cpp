@@ -66,6 +66,7 @@ Json unknown_json(const UnknownStructure& unknown) {
           {"shape", shape},
           {"labels", unknown.labels},
           {"instead_of", unknown.instead_of},
+          {"collinear_with", unknown.collinear_with},
           {"by_sealed_too", unknown.by_sealed_too},
           {"could_be", could_be}};
 }

@@ -155,9 +155,10 @@ struct Observations {
   Eigen::VectorXd sign;
   Rig rig;
   std::vector<Covariate> covariates;
-  std::set<std::string> assumed;                  // covariates nobody recorded: the standard's
-  std::map<std::string, std::string> not_usable;  // covariate: why (missing in some runs, constant, a text)
-  std::vector<std::string> left_out;              // "run: reason", and what else is wrong with runs
+  std::set<std::string> assumed;                    // covariates nobody recorded: the standard's
+  std::map<std::string, std::string> not_usable;    // covariate: why (missing in some runs, constant, a text)
+  std::map<std::string, std::string> left_out_for;  // covariate: why runs are left out for it
+  std::vector<std::string> left_out;                // "run: reason", and what else is wrong with runs
 
   bool line_of_cell = false;            // a linear baseline that is over what a cell is loaded with
   std::string baseline_over;            // covariate that a table's line or power law is over; or empty

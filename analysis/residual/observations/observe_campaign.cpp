@@ -4,6 +4,7 @@
 #include "analysis/residual/observations/campaign_response.h"
 #include "analysis/spectrum.h"
 #include "datasets/error.h"
+#include "datasets/first_few.h"
 #include "datasets/locations.h"
 #include "datasets/open_space.h"
 #include "datasets/run_columns.h"
@@ -16,12 +17,15 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
+#include <utility>
 
 namespace tunnelrig {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr const char* kDuration = "duration_s";   // of a run whose thrusts came as means
+constexpr const char* kDuration = "duration_s";  // of a run whose thrusts came as means
+constexpr const char* kTimeInRun = "time_in_run";
 constexpr const char* kOpenSpace = "open space";  // group of all its runs
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -71,13 +75,16 @@ void add_courses(const CampaignSource& source, Observations& result) {
   }
 }
 
-void add_sheet_covariates(const Source& source, Observations& result) {
+/// Not where the analysis makes a condition of that name itself.
+bool is_read(std::string_view column) { return !is_made_of_times(column) && column != kTimeInRun; }
+
+void add_sheet_covariates(const CampaignSource& source, Observations& result) {
   static const std::set<std::string, std::less<>> kNotConditions = {
       "repeat", "thrust_1_N", "thrust_2_N", "thrust_3_N", "thrust_4_N", "y_norm", "z_norm", kDuration};
   std::set<std::string> names = {std::string(kGroundDistance), std::string(kCeilingDistance)};
   for (Index row = 0; row < source.rows(); ++row)
     for (const auto& [name, value] : source.run(row).numbers)
-      if (!kNotConditions.contains(name) && !is_made_of_times(name)) names.insert(name);
+      if (!kNotConditions.contains(name) && is_read(name)) names.insert(name);
   for (const std::string& name : names) {
     Covariate covariate{name, MatrixXd::Constant(source.rows(), 1, kNaN)};
     Index missing = 0;
@@ -97,7 +104,7 @@ void add_texts(const CampaignSource& source, Observations& result) {
   std::set<std::string> names;
   for (Index row = 0; row < source.rows(); ++row)
     for (const auto& [name, text] : source.run(row).labels)
-      if (!is_made_of_times(name)) names.insert(name);
+      if (is_read(name)) names.insert(name);
   for (const std::string& name : names) {
     std::vector<std::string> texts;
     for (Index row = 0; row < source.rows(); ++row) {
@@ -200,38 +207,21 @@ void add_places(const CampaignSource& source, Observations& result) {
     result.places.push_back({std::string(kPlaces[i]), weights[i]});
 }
 
-struct Response {
-  int channels = 1;
-  std::string unit;
-  std::function<double(Index row, Index channel)> value, known;
-};
-
-Response response_of(const Source& source, const std::string& name, const Eigen::VectorXd& newtons_per_volt) {
-  const Rig& rig = source.data.info.rig;
-  const auto reference_N = [&source, &rig](Index row) {
-    const RunCoefficients& run = source.coefficients(row);
-    return thesis_reference_thrust_N(run.density_kg_m3, run.speed_rpm, rig);
-  };
-  const auto thrust_N = [&source](Index row, Index channel) {
-    return source.coefficients(row).thrust_N[static_cast<std::size_t>(channel)];
-  };
-  if (name == "thrust")
-    return {rig.rotors, "N", thrust_N, [=](Index row, Index) { return reference_N(row); }};
-  if (name == "cell") {
-    return {rig.rotors, "V",
-            [=](Index row, Index channel) { return thrust_N(row, channel) / newtons_per_volt(channel); },
-            [=](Index row, Index channel) { return reference_N(row) / newtons_per_volt(channel); }};
+/// One sentence for each reason, however many runs it is of.
+void say_left_out(const Reduction& reduction, Observations& result) {
+  constexpr std::size_t kNamed = 3;
+  std::vector<std::pair<std::string, std::vector<std::string>>> by_reason;
+  for (const LeftOutRun& run : reduction.left_out) {
+    const auto same = std::ranges::find(by_reason, run.reason, [](const auto& each) { return each.first; });
+    if (same == by_reason.end())
+      by_reason.push_back({run.reason, {run.run}});
+    else
+      same->second.push_back(run.run);
   }
-  if (name == "c_t")
-    return {1, "1", [&source](Index row, Index) { return source.coefficients(row).c_t; },
-            [](Index, Index) { return 1.0; }};
-  return {1, "",
-          [&source, name](Index row, Index) {
-            if (const auto value = source.run(row).number(name)) return *value;
-            throw InputError::at("runs.csv", source.run(row).line, "run {} has no {}, which is the response",
-                                 source.run(row).run, name);
-          },
-          [](Index, Index) { return 1.0; }};
+  for (const auto& [reason, runs] : by_reason)
+    result.left_out.push_back(runs.size() == 1 ? fmt::format("{}: {}", runs[0], reason)
+                                               : fmt::format("{} runs are left out ({}): {}", runs.size(),
+                                                             first_few(runs, kNamed), reason));
 }
 
 /// Of the conditions that a run cannot do without; of the others no run is left out.
@@ -246,23 +236,22 @@ void say_what_lacks_temperature(const CampaignData& data, Observations& result) 
       "missing in {} of {} runs, which are left out: without it there is no density", missing, runs);
 }
 
-/// A few runs below zero where all others pull are errors, and would make the whole model additive.
-void leave_out_against_sign(Source& source, const Response& response, Observations& result) {
-  constexpr std::size_t kOneOf = 20;
-  std::vector<std::size_t> kept;
-  std::vector<std::string> reasons;
-  for (Index row = 0; row < source.rows(); ++row) {
-    double lowest = std::numeric_limits<double>::infinity();
-    for (Index c = 0; c < response.channels; ++c) lowest = std::min(lowest, response.value(row, c));
-    if (lowest > 0)
-      kept.push_back(source.order[static_cast<std::size_t>(row)]);
-    else
-      reasons.push_back(fmt::format("{}: {} is {:.4g} {}, not above 0 as in all other runs",
-                                    source.run(row).run, result.response, lowest, response.unit));
-  }
-  if (reasons.size() * kOneOf > source.order.size()) return;
-  source.order = std::move(kept);
-  result.left_out.insert(result.left_out.end(), reasons.begin(), reasons.end());
+/// Columns with a name that means something else here.
+void warn_of_names(const CampaignData& data, Observations& result) {
+  const auto has = [&](std::string_view name) {
+    return std::ranges::any_of(
+        data.runs, [&](const Run& run) { return run.numbers.contains(name) || run.labels.contains(name); });
+  };
+  for (const char* name : {"thrust", "cell", "c_t"})
+    if (has(name))
+      result.left_out.push_back(fmt::format(
+          "the column {0} is read as a condition: --response {0} is what the cells say; rename the column to "
+          "explain it",
+          name));
+  if (has(kTimeInRun))
+    result.left_out.push_back(fmt::format(
+        "the column {} is not read: that is what explain calls the time since a run began; rename it",
+        kTimeInRun));
 }
 
 Observations observe(const CampaignData& data, const ObservationChoice& choice, bool all_runs) {
@@ -279,7 +268,9 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
   if (result.baseline != "thesis" && result.baseline != "open_space")
     throw InputError(fmt::format("--baseline {}: a campaign has thesis and open_space", result.baseline));
   result.rig = data.info.rig;
-  for (const LeftOutRun& run : reduction.left_out) result.left_out.push_back(run.run + ": " + run.reason);
+  say_left_out(reduction, result);
+  say_what_lacks_temperature(data, result);
+  warn_of_names(data, result);
   result.newtons_per_volt = Eigen::VectorXd::Ones(data.info.rig.rotors);
   if (data.certificate)
     for (int c = 0; c < data.info.rig.rotors; ++c)
