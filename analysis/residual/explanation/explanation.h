@@ -106,6 +106,7 @@ struct Explanation {
   std::string unit_suffix() const { return unit.empty() || unit == "1" ? "" : " " + unit; }
   double noise_floor = 0;
   int blocks = 0, runs = 0;
+  int model_in_force = 0;  // version that reduce goes by, while `baseline` is the thesis's
   ErrorEstimate before, after;
   SealedErrors sealed;
   std::vector<AdoptedEffect> adopted;

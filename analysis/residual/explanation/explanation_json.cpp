@@ -83,6 +83,7 @@ std::string explanation_json(const Explanation& e) {
             {"noise_floor", finite(e.noise_floor)},
             {"blocks", e.blocks},
             {"runs", e.runs},
+            {"model_in_force", e.model_in_force},
             {"before", error_json(e.before)},
             {"after", error_json(e.after)},
             {"adopted", Json::array()},

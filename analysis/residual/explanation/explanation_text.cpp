@@ -182,9 +182,16 @@ std::string verdict_in_words(const Explanation& e) {
 }
 
 std::string explanation_text(const Explanation& e) {
-  std::string text = fmt::format("{}{}response {}, baseline {}, {} runs in {} block{}\n\n{}: {}\n",
-                                 e.campaign, e.campaign.empty() ? "" : ": ", e.response, e.baseline, e.runs,
-                                 e.blocks, e.blocks == 1 ? "" : "s", e.verdict, verdict_in_words(e));
+  std::string text = fmt::format("{}{}response {}, baseline {}, {} runs in {} block{}\n", e.campaign,
+                                 e.campaign.empty() ? "" : ": ", e.response, e.baseline, e.runs, e.blocks,
+                                 e.blocks == 1 ? "" : "s");
+  if (e.model_in_force > 0)
+    text +=
+        wrapped(fmt::format("model version {} is in force for reduce, map and report; explain starts anew "
+                            "from the baseline {}, and "
+                            "finds again what that version holds",
+                            e.model_in_force, e.baseline));
+  text += fmt::format("\n{}: {}\n", e.verdict, verdict_in_words(e));
   for (const AdoptedEffect& adopted : e.adopted) text += in_words(adopted);
   for (const UnknownStructure& unknown : e.unknown) text += in_words(unknown, e.unit_suffix());
   text += errors_in_words(e);
