@@ -73,6 +73,11 @@ int list(const ExplainOptions& options) {
   return kWell;
 }
 
+/// 0: the thesis's.
+int version_in_force(const std::string& db) {
+  return static_cast<int>(stored_models(CampaignFile(db, CampaignFile::Access::kRead)).size());
+}
+
 /// Stores what was accepted as the next version of the model, and says so.
 void adopt_and_store(const ExplainOptions& options, const Observations& observations,
                      const Explanation& explanation) {
@@ -83,6 +88,11 @@ void adopt_and_store(const ExplainOptions& options, const Observations& observat
     return;
   }
   CampaignFile file(options.db, CampaignFile::Access::kWrite);
+  if (const auto stored = stored_models(file);
+      !stored.empty() && corrects_alike(*adoption.model, stored.back().model)) {
+    tell(fmt::format("the same as model {}: nothing is stored\n", stored.back().model.name()));
+    return;
+  }
   const auto certificate = file.newest_document("calibration");
   const nlohmann::json inputs{{"calibration", certificate ? certificate->id : 0}};
   adoption.model->version =
@@ -91,7 +101,20 @@ void adopt_and_store(const ExplainOptions& options, const Observations& observat
                    adoption.model->name()));
 }
 
-int run_explain(ExplainOptions options) {
+/// What would be left out in silence.
+void refuse_unused(const ExplainOptions& options, const CLI::App& verb) {
+  if (options.html == "-") throw InputError("--html -: the page goes to a file; - is of --json");
+  if (!options.list) return;
+  refuse_given(verb,
+               {"--html", "--adopt", "--adopt-empirical", "--max-effects", "--alpha", "--simulations",
+                "--seed", "--session-ratio"},
+               "--list prints the candidates, and explains nothing");
+  if (options.db.empty())
+    refuse_given(verb, {"--response", "--baseline"}, "is of a campaign; with --list it goes with --db");
+}
+
+int run_explain(ExplainOptions options, const CLI::App& verb) {
+  refuse_unused(options, verb);
   if (options.list) return list(options);
   if (options.db.empty()) throw InputError("--db is required (all but --list need a campaign)");
   if ((options.adopt || options.adopt_empirical) && !options.effects.empty())
@@ -109,7 +132,8 @@ int run_explain(ExplainOptions options) {
         options.search.alpha, std::ceil(1 / options.search.alpha) - 1, most, most + 1));
   ProgressBar progress("explaining");
   options.search.progress = [&](const std::string& what) { progress.show(what); };
-  const Explanation explanation = explain(observations, effects.all, options.search);
+  Explanation explanation = explain(observations, effects.all, options.search);
+  explanation.model_in_force = version_in_force(options.db);
   for (const std::string& warning : explanation.warnings) warn(warning);
   const std::string json = explanation_json(explanation);
   if (options.json != "-") fmt::print("{}", explanation_text(explanation));
@@ -167,7 +191,7 @@ void add_explain(CLI::App& app, Work& work) {
   verb->add_flag("--adopt", options->adopt, "Store the accepted effects as the next version of the model");
   verb->add_flag("--adopt-empirical", options->adopt_empirical,
                  "Count the curves that have no name in the error after, and store them with the effects");
-  verb->callback([options, &work] { work = [options] { return run_explain(*options); }; });
+  verb->callback([options, verb, &work] { work = [options, verb] { return run_explain(*options, *verb); }; });
 }
 
 }  // namespace tunnelrig::cli

@@ -89,6 +89,7 @@ void print_rows(const ImportVerbOptions& options, const ObservationTable& table,
                                 {"covariates", nlohmann::ordered_json::array()}};
     for (const TableColumn& column : table.schema.covariates)
       json["covariates"].push_back(column_json(column));
+    if (options.format == "rcbenchmark") json["rows_without_response"] = table.without_response;
     json["doubts"] = doubts;
     fmt::print("{}\n", json.dump(1));
     return;
@@ -100,6 +101,9 @@ void print_rows(const ImportVerbOptions& options, const ObservationTable& table,
              parts.groups, parts.groups == 1 ? "group" : "groups", parts.blocks,
              parts.blocks == 1 ? "block" : "blocks", in_words(table.schema.response),
              covariates.empty() ? "no covariates" : covariates);
+  if (table.without_response > 0)
+    fmt::print("{} of {} rows have no {}, and are left out\n", table.without_response,
+               table.without_response + table.rows.size(), table.schema.response.column);
 }
 
 int import_rows(const ImportVerbOptions& options) {

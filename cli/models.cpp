@@ -29,11 +29,17 @@ Json number_in(const Json& explanation, const char* first, const char* second = 
   return at->is_number() ? *at : Json(nullptr);
 }
 
+/// "2026-03-02T08:00:00Z" of whatever fraction of a second it was.
+std::string whole_seconds(const std::string& utc) {
+  const std::size_t point = utc.find('.');
+  return point == std::string::npos ? utc : utc.substr(0, point) + "Z";
+}
+
 Json version_json(const StoredModel& stored, bool in_force) {
   const Json explanation = Json::parse(stored.model.explanation);
   return {{"version", stored.model.version},
           {"parent", stored.model.parent},
-          {"created_utc", stored.created_utc},
+          {"created_utc", whole_seconds(stored.created_utc)},
           {"program", stored.provenance.program_version},
           {"arguments", stored.provenance.arguments},
           {"baseline", stored.model.baseline},

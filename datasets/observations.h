@@ -76,6 +76,7 @@ struct ObservationTable {
   TableSchema schema;
   Sheet sheet;
   std::vector<Observation> rows;
+  std::size_t without_response = 0;  // rows of a log that are left out
 };
 
 /// Checks a sheet against its schema and converts it. Throws InputError naming file, line and column.

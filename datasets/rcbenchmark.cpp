@@ -189,6 +189,24 @@ std::string sweep_schema(Sheet& all, const std::vector<SweepColumns>& sweeps, co
   return toml;
 }
 
+/// A log has a row for every reading of any sensor, and the cell's are the fewest: how many rows have none,
+/// which go. A file without any is refused.
+std::size_t leave_out_rows_without(const std::string& response, Sheet& all) {
+  all.require(response);
+  std::map<std::string, bool> has;
+  std::vector<Sheet::Row> kept;
+  for (std::size_t row = 0; row < all.rows.size(); ++row) {
+    const bool read = all.number(row, response).has_value();
+    has[all.rows[row].file] |= read;
+    if (read) kept.push_back(all.rows[row]);
+  }
+  for (const auto& [file, any] : has)
+    if (!any) throw InputError::in(file, "no row has a value of {}, which is the response", response);
+  const std::size_t without = all.rows.size() - kept.size();
+  all.rows = std::move(kept);
+  return without;
+}
+
 }  // namespace
 
 ObservationTable read_rcbenchmark(const std::filesystem::path& source, const SweepOptions& options) {
@@ -210,7 +228,10 @@ ObservationTable read_rcbenchmark(const std::filesystem::path& source, const Swe
       options.schema.empty() ? sweep_schema(all, read, options, source.string()) : read_text(options.schema);
   const std::string name = options.schema.empty() ? "the headers' schema" : options.schema.string();
   const TableSchema parsed = parse_table_schema(toml, name);
-  return read_observations(with_days_for_dates(std::move(all), parsed), parsed);
+  const std::size_t without = leave_out_rows_without(parsed.response.column, all);
+  ObservationTable table = read_observations(with_days_for_dates(std::move(all), parsed), parsed);
+  table.without_response = without;
+  return table;
 }
 
 }  // namespace tunnelrig

@@ -16,7 +16,8 @@ struct SweepOptions {
 };
 
 /// `import --format rcbenchmark`: one RCbenchmark/Tyto sweep or a folder of them, units in the header. The
-/// rows are stacked under the columns `file`, those of `sweeps_csv`, and the sweeps' own.
+/// rows are stacked under the columns `file`, those of `sweeps_csv`, and the sweeps' own; those without a
+/// thrust are left out, and counted.
 ObservationTable read_rcbenchmark(const std::filesystem::path& source, const SweepOptions& options);
 
 }  // namespace tunnelrig

@@ -12,6 +12,9 @@ std::string_view known_but_for_case(std::string_view column);
 /// How spreadsheets and programs write that there is no number: "NaN", "#N/A", …
 bool stands_for_no_number(std::string_view cell);
 
+/// Whether the column says which run it is and what became of it: read as it stands, and no condition.
+bool is_text_column(std::string_view column);
+
 /// Whether the analysis makes a condition of that name from the times of the runs (docs/effects.md): a column
 /// of it is not read.
 bool is_made_of_times(std::string_view column);

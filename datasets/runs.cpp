@@ -47,10 +47,6 @@ constexpr std::array<KnownColumn, 17> kKnown = {{
 constexpr std::array<std::string_view, 10> kText = {"run",  "location", "session",  "start_utc", "raw",
                                                     "kind", "repeat",   "excluded", "note",      "alarms"};
 
-bool is_text_column(std::string_view name) {
-  return std::find(kText.begin(), kText.end(), name) != kText.end();
-}
-
 const KnownColumn* known_column(std::string_view name) {
   const auto* found =
       std::find_if(kKnown.begin(), kKnown.end(), [&](const auto& k) { return k.name == name; });
@@ -199,6 +195,10 @@ void check_source(const Sheet& sheet, const Run& run, const CampaignInfo& campai
 }
 
 }  // namespace
+
+bool is_text_column(std::string_view column) {
+  return std::find(kText.begin(), kText.end(), column) != kText.end();
+}
 
 std::string_view known_but_for_case(std::string_view column) {
   const std::string lower = lower_case(column);

@@ -86,7 +86,7 @@ class Forward {
         model_.multiplicative ? multiplied(row, force_N, parameters) : added_to(row, force_N, parameters);
     for (Index c = 0; c < force_N.size(); ++c) {
       const double curves = curve_sum(row, c, parameters);
-      model_.multiplicative ? result(c) *= std::exp(curves) : result(c) += curves;
+      model_.multiplicative ? result(c) *= std::exp(curves) : result(c) += curves * air(row, c);
     }
     return result;
   }
@@ -108,6 +108,11 @@ class Forward {
   }
 
  private:
+  /// What curves that add go with (Observations::known), as far as these runs tell.
+  double air(Index row, Index channel) const {
+    return observations_.multiplicative ? 1 : observations_.known(row, channel);
+  }
+
   /// Each effect acts on what those before it have made of the forces. What depends on the run before is
   /// judged by predictions, or its sign would follow the scatter, and nothing acts on it.
   VectorXd added_to(Index row, const VectorXd& force_N, const VectorXd& parameters) const {

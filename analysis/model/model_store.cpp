@@ -3,10 +3,17 @@
 #include "analysis/model/apply_model.h"
 #include "datasets/error.h"
 
+#include <algorithm>
+#include <array>
 #include <charconv>
+#include <cmath>
+
+#include <nlohmann/json.hpp>
 
 namespace tunnelrig {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr const char* kKind = "model";
 
@@ -22,6 +29,17 @@ int version_from(const std::string& text) {
   if (error != std::errc() || end != text.data() + text.size() || version < 0)
     throw InputError(fmt::format("--model {}: write thesis, latest or the number of a version", text));
   return version;
+}
+
+/// Another build of the program rounds otherwise.
+bool is_nearly(const Json& one, const Json& other) {
+  constexpr double kSame = 1e-4;
+  if (one.is_number() && other.is_number()) {
+    const double a = one.get<double>(), b = other.get<double>();
+    return std::abs(a - b) <= kSame * std::max(std::abs(a), std::abs(b));
+  }
+  if (!one.is_structured() || one.type() != other.type()) return one == other;
+  return one.size() == other.size() && std::equal(one.begin(), one.end(), other.begin(), is_nearly);
 }
 
 }  // namespace
@@ -47,6 +65,12 @@ int store_model(CampaignFile& file, ModelVersion model, const Provenance& proven
     file.add_document(kKind, provenance, model_json(model));
   });
   return model.version;
+}
+
+bool corrects_alike(const ModelVersion& one, const ModelVersion& other) {
+  const Json a = Json::parse(model_json(one)), b = Json::parse(model_json(other));
+  return std::ranges::all_of(std::array{"baseline", "multiplicative", "terms", "curves"},
+                             [&](const char* key) { return is_nearly(a[key], b[key]); });
 }
 
 ModelChoice choose_model(const CampaignFile& file, const std::string& model, const std::string& terms) {

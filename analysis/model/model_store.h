@@ -22,6 +22,10 @@ std::vector<StoredModel> stored_models(const CampaignFile& file);
 /// Stores a model as the next version, which it returns.
 int store_model(CampaignFile& file, ModelVersion model, const Provenance& provenance);
 
+/// Whether two correct alike, to four digits: effects, parameters and curves, whatever explanation they are
+/// of.
+bool corrects_alike(const ModelVersion& one, const ModelVersion& other);
+
 /// What a reduction goes by: the thesis's model with some terms switched on, or an adopted version.
 struct ModelChoice {
   ModelTerms terms;

@@ -193,7 +193,7 @@ class Page {
     const AdoptedEffect& adopted = explanation_.adopted[t];
     const MatrixXd added = visible(added_by(t));
     const MatrixXd fitted =
-        observations_.multiplicative ? MatrixXd(added.array() * forces_.predicted.array()) : added;
+        added.cwiseProduct(observations_.multiplicative ? forces_.predicted : observations_.known);
     std::vector<std::string> names = adopted.term.effect->covariates;
     if (names.empty() && adopted.term.effect->needs_previous) names = {"run_order"};
     if (names.empty()) {  // it goes with the force itself

@@ -206,6 +206,23 @@ TEST(Rcbenchmark, AFileWithoutTheThrustOfTheOthersIsNamed) {
               testing::StrEq("c.csv:1: no column Thrust (gf), which other files of the folder have"));
 }
 
+/// The program's own logs have a row for every reading of any sensor, and a thrust in few of them.
+TEST(Rcbenchmark, RowsWithoutAThrustAreLeftOutAndCounted) {
+  const test::TemporaryFolder folder;
+  const std::string header = "Time (s),Thrust (gf),Motor Optical Speed (RPM)\n";
+  std::filesystem::create_directory(folder / "in");
+  write_text(folder / "in/a.csv", header + "0,,0\n1,10,3000\n2,,4000\n3,40,6000\n");
+  write_text(folder / "in/b.csv", header + "0,10,3000\n");
+  const auto table = read_rcbenchmark(folder / "in", {});
+  ASSERT_EQ(table.rows.size(), 3u);
+  EXPECT_EQ(table.without_response, 2u);
+  EXPECT_EQ(table.rows[1].place, "a.csv:5");
+  EXPECT_EQ(table.rows[1].speed_rpm, 6000);
+  write_text(folder / "in/b.csv", header + "0,,3000\n1,,3000\n");
+  EXPECT_THAT(message_of([&] { read_rcbenchmark(folder / "in", {}); }),
+              testing::StrEq("b.csv: no row has a value of Thrust (gf), which is the response"));
+}
+
 TEST(Rcbenchmark, MessagesMayHoldCommas) {
   const test::TemporaryFolder folder;
   write_text(folder / "s.csv",

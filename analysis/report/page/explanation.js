@@ -46,7 +46,7 @@ const untestableSection = () => table(
       {name: 'effect', cell: (u) => u.effect, text: true},
       {
         name: 'why',
-        cell: (u) => (u.missing.length ? `not recorded: ${u.missing.join(', ')}` : u.reason),
+        cell: (u) => (u.missing.length && u.effect !== 'structure' ? `not recorded: ${u.missing.join(', ')}` : u.reason),
         text: true
       },
     ],
@@ -73,6 +73,9 @@ function provenance() {
     ['This page', [code(made), h('br'), `${program}, ${created}`]],
     ['Campaign file', h('code', {}, db)],
     ['Response and baseline', `${explanation.response}, ${explanation.baseline}`],
+    ...(explanation.model_in_force ?
+            [['Model', `version ${explanation.model_in_force} is in force for reduce, map and report; this explanation starts anew from the baseline ${explanation.baseline}`]] :
+            []),
     ['Settings', `α ${alpha}, at most ${most} effects, up to ${simulations} simulated maxima, seed ${seed}`],
   ];
   return h('dl', {}, facts.map(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));

@@ -143,8 +143,9 @@ const unknownText = (unknown, unit) => {
           'would do as well, and could not be scored any more: more sessions would tell' :
           'may have a part in it: found before it, and not beyond chance beside it'}.` :
       '';
+  const twins = unknown.collinear_with?.length ? ` Not to be told from ${unknown.collinear_with.join(', ')}.` : '';
   const where = `${rotor ? ` at rotor ${rotor}` : ''}${placeText(place)}${timesText(times)}`;
   return `Depends on \`${covariate}\`${where}: amplitude ${digits(amplitude)}${
-      unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${bySealed}${names}${labelsText(unknown, unit)}${
+      unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${twins}${bySealed}${names}${labelsText(unknown, unit)}${
       insteadOf.length ? ` It bends away from the formula of ${insteadOf.join(', ')}.` : ''}`;
 };

@@ -60,82 +60,6 @@ std::string no_value_in_words(const Effect& effect, const Observations& observat
                      fmt::join(conditions, ", "));
 }
 
-bool varies_within_groups(const Observations& observations, const Covariate& covariate) {
-  std::map<int, double> first;
-  for (const int row : observations.all_rows()) {
-    const double value = covariate.value(row, 0);
-    if (first.emplace(observations.group[static_cast<std::size_t>(row)], value).first->second != value)
-      return true;
-  }
-  return false;
-}
-
-/// Why nothing can be found that follows a condition; empty where something can. `named`: an effect has it.
-std::string unseen(const Observations& observations, const Covariate& covariate, const std::vector<int>& rows,
-                   bool named) {
-  const bool texts = !covariate.labels.empty(), table = observations.from_table;
-  const int values = different_values(covariate, rows);
-  if (values == 1 || is_constant(covariate))
-    return texts ? "" : fmt::format("is the same in every {}", table ? "row" : "run");
-  if (!varies_within_groups(observations, covariate))
-    return fmt::format("does not vary within any {}", table ? "group" : "location");
-  if ((texts || (values == 2 && !named)) && levels_of(observations, covariate, rows).empty())
-    return "has fewer than two values that three blocks have, or more than twelve";
-  return "";
-}
-
-void warn_of_unseen(const Observations& observations, const std::vector<const Effect*>& effects,
-                    const std::vector<int>& rows, Explanation& explanation) {
-  for (const Covariate& covariate : observations.covariates) {
-    if (covariate.derived || covariate.per_channel() || observations.not_usable.contains(covariate.name) ||
-        observations.assumed.contains(covariate.name) || covariate.value.array().isNaN().any())
-      continue;
-    if (const Covariate* number = number_of_texts(observations, covariate)) {
-      explanation.warnings.push_back(
-          fmt::format("{} has one {} for each of its texts: what goes with them is said of {}",
-                      covariate.name, number->name, number->name));
-      continue;
-    }
-    const bool named = std::any_of(effects.begin(), effects.end(), [&](const Effect* effect) {
-      const auto& names = effect->covariates;
-      return std::find(names.begin(), names.end(), covariate.name) != names.end();
-    });
-    const std::string why = unseen(observations, covariate, rows, named);
-    if (!why.empty())
-      explanation.warnings.push_back(
-          fmt::format("{} {}: nothing can be found that follows it", covariate.name, why));
-  }
-}
-
-void warn_of_collinear(const Observations& observations, const std::vector<const Effect*>& effects,
-                       Explanation& explanation) {
-  for (std::size_t a = 0; a < observations.covariates.size(); ++a)
-    for (std::size_t b = a + 1; b < observations.covariates.size(); ++b) {
-      const Covariate &first = observations.covariates[a], &second = observations.covariates[b];
-      if ((first.derived && second.derived) || !first.labels.empty() || !second.labels.empty()) continue;
-      if (first.value.array().isNaN().any() || second.value.array().isNaN().any()) continue;
-      if (is_constant(first) || is_constant(second)) continue;  // said already
-      const double together = correlation(first, second);
-      if (std::abs(together) < 0.999) continue;
-      explanation.warnings.push_back(
-          fmt::format("{} and {} go together (correlation {:.4f}): effects of the two cannot be told apart",
-                      first.name, second.name, together));
-      for (const Effect* effect : effects)
-        for (const std::string& covariate : effect->covariates)
-          if (covariate == second.name || covariate == first.name)
-            explanation.untestable.push_back(
-                {effect->name,
-                 fmt::format("{} is collinear with {}: it is tried, but not on its own", covariate,
-                             covariate == first.name ? second.name : first.name),
-                 {}});
-    }
-  std::vector<Untestable> once;
-  for (const Untestable& entry : explanation.untestable)
-    if (std::none_of(once.begin(), once.end(), [&](const Untestable& u) { return u.effect == entry.effect; }))
-      once.push_back(entry);
-  explanation.untestable = std::move(once);
-}
-
 /// The first run of a change-point's interval from which on a condition has none of the values before it.
 std::optional<Index> changes_for_good(const Observations& observations, const Covariate& covariate,
                                       const ParameterEstimate& point) {
@@ -162,16 +86,46 @@ CanBeFound::CanBeFound(const Observations& observations)
       // NOLINTNEXTLINE(clang-analyzer-optin.cplusplus.UninitializedObject)
       has_evidence_(observations, baseline_) {}
 
+/// The first row in which the first way has no value, where none of them has one in all rows.
+std::optional<Index> CanBeFound::undefined_in_all(const std::vector<Term>& ways) const {
+  std::optional<Index> first;
+  for (const Term& way : ways) {
+    const auto row = has_evidence_.undefined(way);
+    if (!row) return {};
+    if (!first) first = row;
+  }
+  return first;
+}
+
+/// Whether it does something within a location, but not to first order.
+bool CanBeFound::is_flat_at_zero(Term way) const {
+  constexpr double kRounding = 1e-9;
+  const EffectParameter& amplitude = way.effect->parameters[0];
+  const Eigen::MatrixXd predicted =
+      predict_response(observations_, {terms_of_theory(observations_), {}}, rows_);
+  if (!respond(way, observations_, predicted).derivative[0][0].isZero(0)) return false;
+  way.parameters[0] = amplitude.upper > 0 ? amplitude.upper : amplitude.lower;
+  Components components(1 + observations_.shape.size(),
+                        Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
+  components[0] = respond(way, observations_, predicted).value[0];
+  return components[0].cwiseAbs().maxCoeff() > kRounding && baseline_.sees(components);
+}
+
 Testability CanBeFound::operator()(const Effect& effect) const {
   Testability can = testability(effect, observations_);
   if (!can.ok()) return can;
   const std::vector<Term> ways = ways_to_try(effect, observations_, rows_);
   if (ways.empty())
     can.reason = "there are too few blocks on both sides of any step";
-  else if (const auto row = has_evidence_.undefined(ways[0]))
+  else if (const auto row = undefined_in_all(ways))
     can.reason = no_value_in_words(effect, observations_, *row);
   else if (std::none_of(ways.begin(), ways.end(), std::cref(has_evidence_)))
-    can.reason = effect.of_zero && has_tares(observations_, effect) ? "the tares take it off"
+    can.reason = std::ranges::any_of(ways, [&](const Term& way) { return is_flat_at_zero(way); })
+                     ? fmt::format(
+                           "its derivative by {0} is 0 where {0} is 0, and it is sought by that: let the "
+                           "force change in proportion to a small {0}",
+                           effect.parameters[0].name)
+                 : effect.of_zero && has_tares(observations_, effect) ? "the tares take it off"
                  : observations_.from_table
                      ? "it does not vary within any group beside the baseline, which absorbs it"
                      : "it does not vary within any location, so the location's coefficient absorbs it";
@@ -184,8 +138,7 @@ void report_untestable(const Observations& observations, const std::vector<const
   for (const Untestable& entry : explanation.untestable)
     if (entry.reason.starts_with(kNoValue))
       explanation.warnings.push_back(fmt::format("{} is not tried: {}", entry.effect, entry.reason));
-  warn_of_unseen(observations, effects, rows, explanation);
-  warn_of_collinear(observations, effects, explanation);
+  report_unseen_conditions(observations, effects, rows, explanation);
 }
 
 void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation) {

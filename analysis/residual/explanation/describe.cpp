@@ -232,6 +232,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   if (const Covariate* covariate = observations.find(result.condition)) {
     result.covariate_unit = covariate->unit;
     if (covariate->derived) result.covariate = column_behind(covariate->name);
+    result.collinear_with = collinear_with(observations, *covariate);
   }
   const Curve curve = as_drawn(observations, found.curve, rows);
   std::vector<Components> columns = fit.linear.columns;
@@ -245,7 +246,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   const auto k = static_cast<Index>(curve.columns.size());
   VectorXd amplitude = amplitudes.amplitude.tail(k);
   MatrixXd covariance = amplitudes.covariance.bottomRightCorner(k, k);
-  const double scale = observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
+  const double scale = observations.response_per_y();
   const bool within = found.curve.x.size() == 0;
   if (!within)
     keep_to_its_own_size(observations, rows, {columns.begin(), columns.end() - k}, curve, amplitude,

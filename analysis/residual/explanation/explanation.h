@@ -72,11 +72,12 @@ struct UnknownStructure {
   double p_value = 1;
   double amplitude = 0;  // half of peak to peak, unit of the response
   std::vector<ShapePoint> shape;
-  bool levels = false;                  // the shape is one of few values, and nothing lies between them
-  std::vector<std::string> labels;      // of a column of texts: x = i + 1 stands for labels[i]
-  std::vector<std::string> instead_of;  // effects over this covariate that do not follow it
-  bool by_sealed_too = false;           // the open blocks alone do not show it
-  bool in_some_runs = false;            // found in those that have the condition
+  bool levels = false;                      // the shape is one of few values, and nothing lies between them
+  std::vector<std::string> labels;          // of a column of texts: x = i + 1 stands for labels[i]
+  std::vector<std::string> instead_of;      // effects over this covariate that do not follow it
+  bool by_sealed_too = false;               // the open blocks alone do not show it
+  bool in_some_runs = false;                // found in those that have the condition
+  std::vector<std::string> collinear_with;  // other conditions that it may be as well
   std::vector<Term> could_be;  // names that go with it so nearly, or come so late, that none is given
 
   /// Whether it is a curve that the model can have, and errors can be given with.
@@ -84,6 +85,8 @@ struct UnknownStructure {
     return !by_sealed_too && !in_some_runs && !shape.empty() && covariate != "session";
   }
 };
+
+inline constexpr const char* kStructure = "structure";  // what has no name, over the column that is `missing`
 
 struct Untestable {
   std::string effect, reason;
@@ -103,6 +106,7 @@ struct Explanation {
   std::string unit_suffix() const { return unit.empty() || unit == "1" ? "" : " " + unit; }
   double noise_floor = 0;
   int blocks = 0, runs = 0;
+  int model_in_force = 0;  // version that reduce goes by, while `baseline` is the thesis's
   ErrorEstimate before, after;
   SealedErrors sealed;
   std::vector<AdoptedEffect> adopted;
@@ -146,6 +150,9 @@ class CanBeFound {
   Testability operator()(const Effect& effect) const;
 
  private:
+  std::optional<Eigen::Index> undefined_in_all(const std::vector<Term>& ways) const;
+  bool is_flat_at_zero(Term way) const;
+
   const Observations& observations_;
   std::vector<int> rows_;
   MixedModel baseline_;

@@ -66,6 +66,7 @@ Json unknown_json(const UnknownStructure& unknown) {
           {"shape", shape},
           {"labels", unknown.labels},
           {"instead_of", unknown.instead_of},
+          {"collinear_with", unknown.collinear_with},
           {"by_sealed_too", unknown.by_sealed_too},
           {"could_be", could_be}};
 }
@@ -82,6 +83,7 @@ std::string explanation_json(const Explanation& e) {
             {"noise_floor", finite(e.noise_floor)},
             {"blocks", e.blocks},
             {"runs", e.runs},
+            {"model_in_force", e.model_in_force},
             {"before", error_json(e.before)},
             {"after", error_json(e.after)},
             {"adopted", Json::array()},

@@ -44,6 +44,20 @@ void estimate_on_all(const Models& models, const Observations& observations,
 void report_untestable(const Observations& observations, const std::vector<const Effect*>& effects,
                        const std::vector<int>& rows, Explanation& explanation);
 
+// --- unseen_conditions.cpp
+
+inline constexpr double kCollinear = 0.999;  // correlation
+
+/// Conditions that are the same in every run, missing in some or collinear with another: warnings, and
+/// entries of what is untestable.
+void report_unseen_conditions(const Observations& observations, const std::vector<const Effect*>& effects,
+                              const std::vector<int>& rows, Explanation& explanation);
+
+/// Other conditions that go with this one so nearly that what is said of it may be theirs.
+std::vector<std::string> collinear_with(const Observations& observations, const Covariate& covariate);
+
+// --- conditions.cpp
+
 /// Conditions that change once and for all where an adopted step may be: another battery, other blades.
 void warn_of_changes_at_steps(const Observations& observations, Explanation& explanation);
 

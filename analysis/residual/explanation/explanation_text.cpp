@@ -113,6 +113,9 @@ std::string in_words(const UnknownStructure& u, const std::string& unit) {
   if (u.by_sealed_too)
     text +=
         "    only with the sealed blocks in: the others are too few to show it, so it is not in the errors\n";
+  if (!u.collinear_with.empty())
+    text += wrapped(
+        fmt::format("  not to be told from {}, which goes with it", fmt::join(u.collinear_with, ", ")));
   if (!u.could_be.empty()) text += wrapped("  " + could_be_in_words(u));
   if (!u.instead_of.empty())
     text += fmt::format("    in which it bends away from the formula of {}\n", fmt::join(u.instead_of, ", "));
@@ -140,7 +143,7 @@ std::string in_words(const std::vector<Untestable>& untestable) {
   std::map<std::string, std::vector<std::string>> by_reason;
   std::vector<std::string> not_recorded;
   for (const Untestable& u : untestable)
-    if (u.missing.empty())
+    if (u.missing.empty() || u.effect == kStructure)
       by_reason[u.reason].push_back(u.effect);
     else
       not_recorded.push_back(fmt::format("{} ({})", u.effect, fmt::join(u.missing, ", ")));
@@ -179,9 +182,16 @@ std::string verdict_in_words(const Explanation& e) {
 }
 
 std::string explanation_text(const Explanation& e) {
-  std::string text = fmt::format("{}{}response {}, baseline {}, {} runs in {} block{}\n\n{}: {}\n",
-                                 e.campaign, e.campaign.empty() ? "" : ": ", e.response, e.baseline, e.runs,
-                                 e.blocks, e.blocks == 1 ? "" : "s", e.verdict, verdict_in_words(e));
+  std::string text = fmt::format("{}{}response {}, baseline {}, {} runs in {} block{}\n", e.campaign,
+                                 e.campaign.empty() ? "" : ": ", e.response, e.baseline, e.runs, e.blocks,
+                                 e.blocks == 1 ? "" : "s");
+  if (e.model_in_force > 0)
+    text +=
+        wrapped(fmt::format("model version {} is in force for reduce, map and report; explain starts anew "
+                            "from the baseline {}, and "
+                            "finds again what that version holds",
+                            e.model_in_force, e.baseline));
+  text += fmt::format("\n{}: {}\n", e.verdict, verdict_in_words(e));
   for (const AdoptedEffect& adopted : e.adopted) text += in_words(adopted);
   for (const UnknownStructure& unknown : e.unknown) text += in_words(unknown, e.unit_suffix());
   text += errors_in_words(e);

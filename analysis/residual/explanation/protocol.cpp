@@ -21,11 +21,6 @@ using Eigen::MatrixXd;
 constexpr int kFewestBlocks = 6;
 constexpr std::size_t kFewestOpenBlocks = 4;  // of six, the seal leaves as many
 
-/// Response per unit of y.
-double scale_of(const Observations& observations) {
-  return observations.multiplicative ? observations.value.cwiseAbs().mean() : 1;
-}
-
 /// Whether the sealed runs speak against a model: they are predicted clearly worse than without it, and worse
 /// than either expects of itself (gross runs among the open ones are taken for scatter). Where an effect does
 /// little in them (they lie at its reference) it is chance whether the error grows.
@@ -71,6 +66,16 @@ JointFit without_curves(JointFit fit, const Observations& observations, const st
   return fit;
 }
 
+/// Whether anything predicts one of these sealed rows: another run of its location, or where the block is the
+/// group the rest of it.
+bool can_be_scored(const Observations& observations, const Seal& seal, const std::vector<int>& rows) {
+  const auto open = places_of_each(observations.group, seal.open);
+  return std::ranges::any_of(rows, [&](int row) {
+    return observations.groups_within_blocks ||
+           open.contains(observations.group[static_cast<std::size_t>(row)]);
+  });
+}
+
 /// Why nothing can be found out, in words; empty where something can.
 std::string too_few(const Observations& observations, const Seal& seal) {
   if (observations.blocks() < kFewestBlocks)
@@ -89,6 +94,13 @@ std::string too_few(const Observations& observations, const Seal& seal) {
     return fmt::format(
         "the baseline has as many constants as there are {} to fit: nothing is left to explain",
         observations.from_table ? "rows" : "runs");
+  if (observations.held_out.empty() && !can_be_scored(observations, seal, seal.sealed))
+    return fmt::format(
+        "each {0} has {1} in one block only: what it does cannot be told from what the block did, and no {2} "
+        "that "
+        "is held out can be predicted; come back to a {0} in another block",
+        observations.from_table ? "group" : "location", observations.from_table ? "rows" : "runs",
+        observations.from_table ? "row" : "run");
   return "";
 }
 
@@ -115,7 +127,7 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
   set_interval(observations, errors, {}, settings.seed, explanation.before);
   explanation.after = explanation.before;
   explanation.detectable =
-      scale_of(observations) *
+      observations.response_per_y() *
       detectable_by_one(MixedModel(observations, rows, fit.variances.ratio), fit.variances, settings.alpha);
   // Too few blocks for an effect are enough to see a typing error.
   const HeldOutErrors fitted = score(observations, fit, rows, rows);
@@ -174,9 +186,9 @@ void report_search(const Attribution& found, const Observations& observations, c
   warn_of_bounds(observations, found, explanation);
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
-  explanation.detectable = found.detectable_sigma * scale_of(observations);
+  explanation.detectable = found.detectable_sigma * observations.response_per_y();
   for (const auto& [name, sigma] : found.detectable_by_effect)
-    explanation.detectable_by_effect[name] = sigma * scale_of(observations);
+    explanation.detectable_by_effect[name] = sigma * observations.response_per_y();
 }
 
 /// Sealed runs that a model can be asked for; which are not is said.
@@ -186,6 +198,7 @@ std::vector<int> rows_to_score(const MeanModel& model, const Seal& seal, const O
   std::vector<int> scored;
   std::set_difference(seal.sealed.begin(), seal.sealed.end(), astride.begin(), astride.end(),
                       std::back_inserter(scored));
+  if (!can_be_scored(observations, seal, scored)) return seal.sealed;
   if (!astride.empty())
     explanation.warnings.push_back(fmt::format(
         "{} of the {} sealed runs lie where a step may be as well, so they are not scored: {} to {}",

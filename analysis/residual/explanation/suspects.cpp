@@ -90,15 +90,16 @@ VectorXd distance_of_those_apart(const Observations& observations, const std::ve
   return VectorXd::Zero(residual.size());
 }
 
-/// What was predicted, where the model is of logarithms.
+/// What was predicted, where the model is of logarithms; what is known, where it is not.
 MatrixXd scale_of_residuals(const Observations& observations, const HeldOutErrors& errors) {
-  if (!observations.multiplicative) return MatrixXd::Ones(errors.error.rows(), errors.error.cols());
+  if (!observations.multiplicative) return observations.known(errors.rows, Eigen::all);
   return (observations.value(errors.rows, Eigen::all) + errors.error).cwiseAbs();
 }
 
 /// On the scale of the model, where residuals are normal: of a tenth and of ten times alike.
 MatrixXd residuals_of(const Observations& observations, const HeldOutErrors& errors) {
-  if (!observations.multiplicative) return -errors.error;
+  if (!observations.multiplicative)
+    return -errors.error.cwiseQuotient(scale_of_residuals(observations, errors));
   return (observations.value(errors.rows, Eigen::all).array().abs() /
           scale_of_residuals(observations, errors).array())
       .log();

@@ -215,11 +215,12 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
   for (Index r = 0; r < n; ++r)
     for (Index channel = 0; channel < c; ++channel) {
       const double value = observations.value(test_rows[static_cast<std::size_t>(r)], channel);
-      const double predicted =
-          observations.multiplicative ? value * std::exp(-error_y(r, channel)) : value - error_y(r, channel);
+      const double known = observations.known(test_rows[static_cast<std::size_t>(r)], channel);
+      const double predicted = observations.multiplicative ? value * std::exp(-error_y(r, channel))
+                                                           : value - known * error_y(r, channel);
       result.error(r, channel) = predicted - value;
       result.expected_std(r, channel) =
-          (observations.multiplicative ? std::abs(predicted) : 1) * std_y(r, channel);
+          std::abs(observations.multiplicative ? predicted : known) * std_y(r, channel);
     }
   return result;
 }

@@ -238,10 +238,9 @@ MatrixXd on_baseline(const Observations& observations, const MatrixXd& residual,
     Eigen::RowVectorXd constant =
         count(group) > 0 ? Eigen::RowVectorXd(sum.row(group) / count(group)) : overall;
     if (observations.is_line()) constant.setZero();
-    predicted.row(row) = observations.multiplicative
-                             ? Eigen::RowVectorXd(observations.known.row(row).array() *
-                                                  (constant + added.row(row)).array().exp())
-                             : Eigen::RowVectorXd(constant + added.row(row));
+    Eigen::ArrayXXd y = constant + added.row(row);
+    if (observations.multiplicative) y = y.exp();
+    predicted.row(row) = observations.known.row(row).array() * y;
   }
   return predicted;
 }
@@ -252,12 +251,15 @@ std::vector<MatrixXd> acted_on(const Observations& observations, const std::vect
                                const MatrixXd& predicted, const std::vector<MatrixXd>& own) {
   std::vector<MatrixXd> result(terms.size());
   const bool of_logarithms = observations.multiplicative;
+  const auto added_by = [&](std::size_t t) -> Eigen::ArrayXXd {
+    return of_logarithms ? MatrixXd(own[t]) : MatrixXd(own[t].cwiseProduct(observations.known));
+  };
   Eigen::ArrayXXd made = predicted;
   if (of_logarithms) made = made.log().eval();
-  for (const MatrixXd& each : own) made -= each.array();
+  for (std::size_t t = 0; t < terms.size(); ++t) made -= added_by(t);
   for (const std::size_t t : order_of_action(terms)) {
     result[t] = of_logarithms ? MatrixXd(made.exp()) : MatrixXd(made);
-    made += own[t].array();
+    made += added_by(t);
   }
   return result;
 }

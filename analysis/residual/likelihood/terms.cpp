@@ -72,7 +72,7 @@ class Evaluation {
     const double force = force_of(row, channel);
     const double duration = observations_.duration_s(row);
     if (duration == 0 || !term_.effect->within_time()) {
-      put(row, channel, 0, change(changed(sample, force), force), response);
+      put(row, channel, 0, change(changed(sample, force), force, row, channel), response);
       return;
     }
     std::array<EffectJet, kShapes + 1> coefficient{};
@@ -83,9 +83,9 @@ class Evaluation {
       for (std::size_t j = 0; j < components; ++j)
         coefficient[j] += cosines()(static_cast<Index>(j), t) * then;
     }
-    put(row, channel, 0, change(coefficient[0], force), response);
+    put(row, channel, 0, change(coefficient[0], force, row, channel), response);
     for (std::size_t j = 1; j < components; ++j)
-      put(row, channel, j, over_mean(coefficient[j], coefficient[0], force), response);
+      put(row, channel, j, over_mean(coefficient[j], coefficient[0], force, row, channel), response);
   }
 
  private:
@@ -120,14 +120,17 @@ class Evaluation {
     return term_.effect->jet_N(sample, parameters_, EffectJet(force));
   }
 
-  /// log(F'/F) where the model is multiplicative, F' − F where it is not: F' the run's mean, as measured.
-  EffectJet change(const EffectJet& mean, double force) const {
-    return observations_.multiplicative ? log_of_share(mean / force) : mean - force;
+  /// log(F'/F) where the model is multiplicative, F' − F over what is known where it is not: F' the run's
+  /// mean, as measured.
+  EffectJet change(const EffectJet& mean, double force, Index row, Index channel) const {
+    return observations_.multiplicative ? log_of_share(mean / force)
+                                        : (mean - force) / observations_.known(row, channel);
   }
 
   /// A course is measured over the run's own mean.
-  EffectJet over_mean(const EffectJet& coefficient, const EffectJet& mean, double force) const {
-    if (!observations_.multiplicative) return coefficient;
+  EffectJet over_mean(const EffectJet& coefficient, const EffectJet& mean, double force, Index row,
+                      Index channel) const {
+    if (!observations_.multiplicative) return coefficient / observations_.known(row, channel);
     const double least = kLeastShare * force;
     return mean.a >= least ? coefficient / mean : coefficient / least;
   }

@@ -118,12 +118,12 @@ struct RunScatter {
 /// Where a campaign's response is positive, and a table's of one sign (unless it scatters alike or the
 /// baseline is `linear:`), the model is multiplicative: `y` is the logarithm of the response over what the
 /// baseline takes as known (k_i ½ρΩ²R²A), and errors are relative. Otherwise it is additive: `y` is the
-/// response.
+/// response over that factor's ratio to its value in standard air (of a table the response itself).
 struct Observations {
   std::string campaign, response, unit, baseline;
   bool multiplicative = true;
   Eigen::MatrixXd value;  // n × c, in the unit
-  Eigen::MatrixXd known;  // n × c: the baseline's known factor; 1 where there is none
+  Eigen::MatrixXd known;  // n × c: the baseline's known factor, or its ratio where additive; 1: there is none
   Eigen::MatrixXd y;      // n × c
   std::vector<Eigen::MatrixXd>
       shape;  // J matrices n × c: cosine coefficients of the run's course; empty without raw data
@@ -155,9 +155,10 @@ struct Observations {
   Eigen::VectorXd sign;
   Rig rig;
   std::vector<Covariate> covariates;
-  std::set<std::string> assumed;                  // covariates nobody recorded: the standard's
-  std::map<std::string, std::string> not_usable;  // covariate: why (missing in some runs, constant, a text)
-  std::vector<std::string> left_out;              // "run: reason", and what else is wrong with runs
+  std::set<std::string> assumed;                    // covariates nobody recorded: the standard's
+  std::map<std::string, std::string> not_usable;    // covariate: why (missing in some runs, constant, a text)
+  std::map<std::string, std::string> left_out_for;  // covariate: why runs are left out for it
+  std::vector<std::string> left_out;                // "run: reason", and what else is wrong with runs
 
   bool line_of_cell = false;            // a linear baseline that is over what a cell is loaded with
   std::string baseline_over;            // covariate that a table's line or power law is over; or empty
@@ -188,6 +189,8 @@ struct Observations {
 
   /// The same with the responses of these rows only, NaN in all others: what must not be seen of sealed rows.
   Observations without_responses_but(const std::vector<int>& rows) const;
+  /// What a small change of y is of the response, on the whole.
+  double response_per_y() const { return multiplicative ? value.cwiseAbs().mean() : known.mean(); }
   bool has_response(Eigen::Index row) const { return !std::isnan(y(row, 0)); }
 };
 

@@ -1,9 +1,10 @@
-#include "analysis/conventions.h"
 #include "analysis/misread_runs.h"
 #include "analysis/reduction.h"
 #include "analysis/residual/observations/campaign_conditions.h"
+#include "analysis/residual/observations/campaign_response.h"
 #include "analysis/spectrum.h"
 #include "datasets/error.h"
+#include "datasets/first_few.h"
 #include "datasets/locations.h"
 #include "datasets/open_space.h"
 #include "datasets/run_columns.h"
@@ -16,31 +17,18 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
+#include <utility>
 
 namespace tunnelrig {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr const char* kDuration = "duration_s";   // of a run whose thrusts came as means
+constexpr const char* kDuration = "duration_s";  // of a run whose thrusts came as means
+constexpr const char* kTimeInRun = "time_in_run";
 constexpr const char* kOpenSpace = "open space";  // group of all its runs
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-struct Source {
-  const CampaignData& data;
-  const Reduction& reduction;
-  std::vector<std::size_t> order;  // of reduction.runs, by time
-
-  Index rows() const { return static_cast<Index>(order.size()); }
-  const RunCoefficients& coefficients(Index row) const {
-    return reduction.runs[order[static_cast<std::size_t>(row)]];
-  }
-  const Run& run(Index row) const { return data.runs[coefficients(row).run]; }
-  const RunStatistics* statistics(Index row) const {
-    const auto found = data.statistics.find(run(row).run);
-    return found == data.statistics.end() || found->second.frames == 0 ? nullptr : &found->second;
-  }
-};
 
 /// cos(π j (w + ½)/W) coefficients of a run's windows, in y's scale: volts times `scale`.
 void set_course(const RunStatistics& statistics, Index row, Index channel, double scale,
@@ -70,7 +58,7 @@ void set_course(const RunStatistics& statistics, Index row, Index channel, doubl
 }
 
 /// Where every run has windows enough, what happened within it.
-void add_courses(const Source& source, Observations& result) {
+void add_courses(const CampaignSource& source, Observations& result) {
   for (Index row = 0; row < source.rows(); ++row) {
     const RunStatistics* statistics = source.statistics(row);
     if (statistics == nullptr ||
@@ -81,19 +69,22 @@ void add_courses(const Source& source, Observations& result) {
   for (Index row = 0; row < source.rows(); ++row) {
     for (Index c = 0; c < result.channels(); ++c) {
       const double per_volt = result.response == "thrust" ? result.newtons_per_volt(c) : 1;
-      const double scale = result.multiplicative ? per_volt / result.value(row, c) : per_volt;
+      const double scale = per_volt / (result.multiplicative ? result.value(row, c) : result.known(row, c));
       set_course(*source.statistics(row), row, c, scale, result.shape);
     }
   }
 }
 
-void add_sheet_covariates(const Source& source, Observations& result) {
+/// Not where the analysis makes a condition of that name itself.
+bool is_read(std::string_view column) { return !is_made_of_times(column) && column != kTimeInRun; }
+
+void add_sheet_covariates(const CampaignSource& source, Observations& result) {
   static const std::set<std::string, std::less<>> kNotConditions = {
       "repeat", "thrust_1_N", "thrust_2_N", "thrust_3_N", "thrust_4_N", "y_norm", "z_norm", kDuration};
   std::set<std::string> names = {std::string(kGroundDistance), std::string(kCeilingDistance)};
   for (Index row = 0; row < source.rows(); ++row)
     for (const auto& [name, value] : source.run(row).numbers)
-      if (!kNotConditions.contains(name) && !is_made_of_times(name)) names.insert(name);
+      if (!kNotConditions.contains(name) && is_read(name)) names.insert(name);
   for (const std::string& name : names) {
     Covariate covariate{name, MatrixXd::Constant(source.rows(), 1, kNaN)};
     Index missing = 0;
@@ -109,11 +100,11 @@ void add_sheet_covariates(const Source& source, Observations& result) {
 }
 
 /// Columns of texts: which battery, which blades.
-void add_texts(const Source& source, Observations& result) {
+void add_texts(const CampaignSource& source, Observations& result) {
   std::set<std::string> names;
   for (Index row = 0; row < source.rows(); ++row)
     for (const auto& [name, text] : source.run(row).labels)
-      if (!is_made_of_times(name)) names.insert(name);
+      if (is_read(name)) names.insert(name);
   for (const std::string& name : names) {
     std::vector<std::string> texts;
     for (Index row = 0; row < source.rows(); ++row) {
@@ -127,7 +118,7 @@ void add_texts(const Source& source, Observations& result) {
 
 /// Hours since the session's first run, hour of the day, the run's number, and the trend of the air's
 /// temperature.
-void add_derived_covariates(const Source& source, Observations& result) {
+void add_derived_covariates(const CampaignSource& source, Observations& result) {
   const Index n = source.rows();
   std::vector<double> first(result.block_name.size(), std::numeric_limits<double>::infinity());
   for (const Run& run : source.data.runs) {  // a tare may have begun the session
@@ -183,7 +174,7 @@ std::map<std::string, std::set<double>> starts_s(const CampaignData& data) {
   return result;
 }
 
-void set_belonging(const Source& source, Observations& result) {
+void set_belonging(const CampaignSource& source, Observations& result) {
   std::map<std::string, int> last;
   const std::map<std::string, std::set<double>> all_starts_s = starts_s(source.data);
   for (Index row = 0; row < source.rows(); ++row) {
@@ -202,7 +193,7 @@ void set_belonging(const Source& source, Observations& result) {
   }
 }
 
-void add_places(const Source& source, Observations& result) {
+void add_places(const CampaignSource& source, Observations& result) {
   Eigen::VectorXd tunnel = Eigen::VectorXd::Zero(source.rows()), y = tunnel, z = tunnel;
   for (Index row = 0; row < source.rows(); ++row) {
     const Run& run = source.run(row);
@@ -216,79 +207,56 @@ void add_places(const Source& source, Observations& result) {
     result.places.push_back({std::string(kPlaces[i]), weights[i]});
 }
 
-struct Response {
-  int channels = 1;
-  std::string unit;
-  std::function<double(Index row, Index channel)> value, known;
-};
-
-Response response_of(const Source& source, const std::string& name, const Eigen::VectorXd& newtons_per_volt) {
-  const Rig& rig = source.data.info.rig;
-  const auto reference_N = [&source, &rig](Index row) {
-    const RunCoefficients& run = source.coefficients(row);
-    return thesis_reference_thrust_N(run.density_kg_m3, run.speed_rpm, rig);
-  };
-  const auto thrust_N = [&source](Index row, Index channel) {
-    return source.coefficients(row).thrust_N[static_cast<std::size_t>(channel)];
-  };
-  if (name == "thrust")
-    return {rig.rotors, "N", thrust_N, [=](Index row, Index) { return reference_N(row); }};
-  if (name == "cell") {
-    return {rig.rotors, "V",
-            [=](Index row, Index channel) { return thrust_N(row, channel) / newtons_per_volt(channel); },
-            [=](Index row, Index channel) { return reference_N(row) / newtons_per_volt(channel); }};
-  }
-  if (name == "c_t")
-    return {1, "1", [&source](Index row, Index) { return source.coefficients(row).c_t; },
-            [](Index, Index) { return 1.0; }};
-  return {1, "",
-          [&source, name](Index row, Index) {
-            if (const auto value = source.run(row).number(name)) return *value;
-            throw InputError::at("runs.csv", source.run(row).line, "run {} has no {}, which is the response",
-                                 source.run(row).run, name);
-          },
-          [](Index, Index) { return 1.0; }};
-}
-
-void set_response(const Source& source, const Response& response, Observations& result) {
-  result.unit = response.unit;
-  result.value.resize(source.rows(), response.channels);
-  result.known.resize(source.rows(), response.channels);
-  for (Index row = 0; row < source.rows(); ++row)
-    for (Index c = 0; c < response.channels; ++c) {
-      result.value(row, c) = response.value(row, c);
-      if (std::abs(result.value(row, c)) > kLargestResponse)
-        throw InputError::at("runs.csv", source.run(row).line, "the response {} is {:g}, beyond ±{:g}",
-                             result.response, result.value(row, c), kLargestResponse);
-      result.known(row, c) = response.known(row, c);
-    }
-  result.multiplicative = result.value.minCoeff() > 0;
-  result.y =
-      result.multiplicative ? MatrixXd((result.value.array() / result.known.array()).log()) : result.value;
-}
-
-/// A few runs below zero where all others pull are errors, and would make the whole model additive.
-void leave_out_against_sign(Source& source, const Response& response, Observations& result) {
-  constexpr std::size_t kOneOf = 20;
-  std::vector<std::size_t> kept;
-  std::vector<std::string> reasons;
-  for (Index row = 0; row < source.rows(); ++row) {
-    double lowest = std::numeric_limits<double>::infinity();
-    for (Index c = 0; c < response.channels; ++c) lowest = std::min(lowest, response.value(row, c));
-    if (lowest > 0)
-      kept.push_back(source.order[static_cast<std::size_t>(row)]);
+/// One sentence for each reason, however many runs it is of.
+void say_left_out(const Reduction& reduction, Observations& result) {
+  constexpr std::size_t kNamed = 3;
+  std::vector<std::pair<std::string, std::vector<std::string>>> by_reason;
+  for (const LeftOutRun& run : reduction.left_out) {
+    const auto same = std::ranges::find(by_reason, run.reason, [](const auto& each) { return each.first; });
+    if (same == by_reason.end())
+      by_reason.push_back({run.reason, {run.run}});
     else
-      reasons.push_back(fmt::format("{}: {} is {:.4g} {}, not above 0 as in all other runs",
-                                    source.run(row).run, result.response, lowest, response.unit));
+      same->second.push_back(run.run);
   }
-  if (reasons.size() * kOneOf > source.order.size()) return;
-  source.order = std::move(kept);
-  result.left_out.insert(result.left_out.end(), reasons.begin(), reasons.end());
+  for (const auto& [reason, runs] : by_reason)
+    result.left_out.push_back(runs.size() == 1 ? fmt::format("{}: {}", runs[0], reason)
+                                               : fmt::format("{} runs are left out ({}): {}", runs.size(),
+                                                             first_few(runs, kNamed), reason));
+}
+
+/// Of the conditions that a run cannot do without; of the others no run is left out.
+void say_what_lacks_temperature(const CampaignData& data, Observations& result) {
+  const auto lack = [](const Run& run) {
+    return run.kind == RunKind::kThrust && run.excluded.empty() && !run.number("air_temperature_C");
+  };
+  const auto missing = std::ranges::count_if(data.runs, lack);
+  if (missing == 0) return;
+  const auto runs = std::ranges::count(data.runs, RunKind::kThrust, &Run::kind);
+  result.left_out_for["air_temperature_C"] = fmt::format(
+      "missing in {} of {} runs, which are left out: without it there is no density", missing, runs);
+}
+
+/// Columns with a name that means something else here.
+void warn_of_names(const CampaignData& data, Observations& result) {
+  const auto has = [&](std::string_view name) {
+    return std::ranges::any_of(
+        data.runs, [&](const Run& run) { return run.numbers.contains(name) || run.labels.contains(name); });
+  };
+  for (const char* name : {"thrust", "cell", "c_t"})
+    if (has(name))
+      result.left_out.push_back(fmt::format(
+          "the column {0} is read as a condition: --response {0} is what the cells say; rename the column to "
+          "explain it",
+          name));
+  if (has(kTimeInRun))
+    result.left_out.push_back(fmt::format(
+        "the column {} is not read: that is what explain calls the time since a run began; rename it",
+        kTimeInRun));
 }
 
 Observations observe(const CampaignData& data, const ObservationChoice& choice, bool all_runs) {
   const Reduction reduction = reduce_runs(data, {});
-  Source source{data, reduction, std::vector<std::size_t>(reduction.runs.size())};
+  CampaignSource source{data, reduction, std::vector<std::size_t>(reduction.runs.size())};
   std::iota(source.order.begin(), source.order.end(), 0U);
   std::stable_sort(source.order.begin(), source.order.end(), [&](std::size_t a, std::size_t b) {
     return data.runs[reduction.runs[a].run].start_s < data.runs[reduction.runs[b].run].start_s;
@@ -300,13 +268,15 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
   if (result.baseline != "thesis" && result.baseline != "open_space")
     throw InputError(fmt::format("--baseline {}: a campaign has thesis and open_space", result.baseline));
   result.rig = data.info.rig;
-  for (const LeftOutRun& run : reduction.left_out) result.left_out.push_back(run.run + ": " + run.reason);
+  say_left_out(reduction, result);
+  say_what_lacks_temperature(data, result);
+  warn_of_names(data, result);
   result.newtons_per_volt = Eigen::VectorXd::Ones(data.info.rig.rotors);
   if (data.certificate)
     for (int c = 0; c < data.info.rig.rotors; ++c)
       result.newtons_per_volt(c) = 1 / (data.certificate->cells[static_cast<std::size_t>(c)].gain_V_per_N *
                                         data.certificate->propellers.factor(c));
-  const Response response = response_of(source, result.response, result.newtons_per_volt);
+  const CampaignResponse response = response_of(source, result.response, result.newtons_per_volt);
   if (result.response != "thrust")
     result.newtons_per_volt.setOnes();  // volts, and whatever else, as they are
   if (!all_runs) leave_out_against_sign(source, response, result);
@@ -350,6 +320,7 @@ Observations observe_campaign(const CampaignData& data, const ObservationChoice&
   if (!(result.value.maxCoeff() > result.value.minCoeff()))
     throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain",
                                  result.response));
+  warn_of_constant_rotors(result);
   for (std::string& misread : in_words(misread_runs(data))) result.left_out.push_back(std::move(misread));
   return result;
 }

@@ -14,8 +14,8 @@ namespace {
 
 /// In the scale of y.
 MatrixXd scaled(const Observations& observations, const MatrixXd& predicted) {
-  return observations.multiplicative ? MatrixXd((predicted.array() / observations.known.array()).log())
-                                     : predicted;
+  const MatrixXd over_known = predicted.cwiseQuotient(observations.known);
+  return observations.multiplicative ? MatrixXd(over_known.array().log()) : over_known;
 }
 
 bool in_one_group(const Observations& observations, Index row, int other) {
@@ -69,7 +69,8 @@ double PreviousRun::error_N(Index row, Index channel) const {
   const int before = observations_.previous[static_cast<std::size_t>(row)];
   if (before < 0 || in_one_group(observations_, row, before)) return 0;
   const double error = std::sqrt(constant_variance_(row, channel) + constant_variance_(before, channel));
-  return observations_.multiplicative ? error * std::abs(force_of(row, channel)) : error;
+  return error * (observations_.multiplicative ? std::abs(force_of(row, channel))
+                                               : std::abs(observations_.known(row, channel)));
 }
 
 }  // namespace tunnelrig

@@ -53,10 +53,26 @@ void expect_finite(const Explanation& e) {
 
 void expect_contract(const Explanation& explanation) {
   const json written = json::parse(explanation_json(explanation));
-  for (const char* key :
-       {"format", "campaign", "response", "unit", "baseline", "verdict", "noise_floor", "blocks", "runs",
-        "before", "after", "adopted", "unknown", "untestable", "suspect_rows",
-        "detectable_at_80_percent_power", "detectable_by_effect", "empirical", "warnings"})
+  for (const char* key : {"format",
+                          "campaign",
+                          "response",
+                          "unit",
+                          "baseline",
+                          "verdict",
+                          "noise_floor",
+                          "blocks",
+                          "runs",
+                          "model_in_force",
+                          "before",
+                          "after",
+                          "adopted",
+                          "unknown",
+                          "untestable",
+                          "suspect_rows",
+                          "detectable_at_80_percent_power",
+                          "detectable_by_effect",
+                          "empirical",
+                          "warnings"})
     EXPECT_TRUE(written.contains(key)) << key;
   EXPECT_EQ(written["format"], "tunnelrig-explain/1");
   for (const char* when : {"before", "after"}) {
@@ -77,7 +93,7 @@ void expect_contract(const Explanation& explanation) {
   }
   for (const json& unknown : written["unknown"]) {
     for (const char* key : {"covariate", "covariate_unit", "place", "times", "rotor", "p_value", "amplitude",
-                            "shape", "labels", "instead_of", "by_sealed_too", "could_be"})
+                            "shape", "labels", "instead_of", "collinear_with", "by_sealed_too", "could_be"})
       EXPECT_TRUE(unknown.contains(key)) << key;
     for (const json& point : unknown["shape"]) EXPECT_EQ(point.size(), 4u);
   }
