@@ -169,24 +169,32 @@ std::string contradiction(const AdoptedEffect& adopted, const Explanation& expla
 }
 
 Refuted refuted(const Explanation& explanation, const Observations& observations) {
-  std::vector<std::pair<const AdoptedEffect*, std::string>> against;  // and why
+  struct Against {
+    const AdoptedEffect* adopted;
+    std::string why;
+    bool never_stays;
+  };
+  std::vector<Against> against;
   bool refutable = false;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     refutable = refutable || !adopted.term.effect->theory_only;
+    const std::string contradicted = contradiction(adopted, explanation, observations);
     std::string why = refutation(adopted, observations);
-    if (why.empty()) why = contradiction(adopted, explanation, observations);
-    if (!why.empty()) against.emplace_back(&adopted, std::move(why));
+    if (why.empty()) why = contradicted;
+    if (why.empty()) continue;
+    const bool never_stays =
+        adopted.at_bound || !contradicted.empty() || !no_more_than_a_line(adopted, observations).empty();
+    against.push_back({&adopted, std::move(why), never_stays});
   }
   // With the wrong one of two equals in, the sealed runs are far from all that was found, and no other effect
   // is seen beside it: what has equals goes first, and the rest is judged beside the one that is left.
-  const auto has_equals = [](const auto& refuted) { return !refuted.first->confounded_with.empty(); };
+  const auto has_equals = [](const Against& refuted) { return !refuted.adopted->confounded_with.empty(); };
   if (std::ranges::any_of(against, has_equals)) std::erase_if(against, std::not_fn(has_equals));
   Refuted result;
-  for (auto& [adopted, why] : against) {
+  for (auto& [adopted, why, never_stays] : against) {
     result.terms.push_back(adopted->term);
     result.why.push_back(std::move(why));
-    result.beyond |= adopted->at_bound || !no_more_than_a_line(*adopted, observations).empty() ||
-                     !contradiction(*adopted, explanation, observations).empty();
+    result.beyond |= never_stays;
     result.structure |= adopted->bends_away || adopted->anywhere;
   }
   result.all =

@@ -97,8 +97,7 @@ std::string too_few(const Observations& observations, const Seal& seal) {
   if (observations.held_out.empty() && !can_be_scored(observations, seal, seal.sealed))
     return fmt::format(
         "each {0} has {1} in one block only: what it does cannot be told from what the block did, and no {2} "
-        "that "
-        "is held out can be predicted; come back to a {0} in another block",
+        "that is held out can be predicted; come back to a {0} in another block",
         observations.from_table ? "group" : "location", observations.from_table ? "rows" : "runs",
         observations.from_table ? "row" : "run");
   return "";

@@ -242,6 +242,8 @@ class Search {
   }
   CrossValidation unseen(const Observations& observations, const JointFit& fit,
                          const NullFit& variances) const;
+  /// Those of the fit, and these.
+  std::vector<Components> columns_with(const std::vector<Components>& more) const;
   /// Of what has been found with these columns in place of its own.
   CrossValidation unseen_with(const std::vector<Components>& columns, const NullFit& variances) const;
 

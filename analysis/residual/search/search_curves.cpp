@@ -84,9 +84,7 @@ std::size_t Search::everywhere_instead(const CurveScan& curves) const {
   const Curve& found = tried[best];
   if (found.in_place().empty()) return best;
   const auto errors_with = [&](const Curve& curve) {
-    std::vector<Components> columns = fit_.linear.columns;
-    columns.insert(columns.end(), curve.columns.begin(), curve.columns.end());
-    return unseen_with(columns, fit_.variances);
+    return unseen_with(columns_with(curve.columns), fit_.variances);
   };
   for (const std::size_t i : scan.order)
     if (tried[i].everywhere() && tried[i].covariate == found.covariate && tried[i].rotor == found.rotor)

@@ -251,6 +251,12 @@ CrossValidation Search::unseen(const Observations& observations, const JointFit&
                         rows_);
 }
 
+std::vector<Components> Search::columns_with(const std::vector<Components>& more) const {
+  std::vector<Components> columns = fit_.linear.columns;
+  columns.insert(columns.end(), more.begin(), more.end());
+  return columns;
+}
+
 CrossValidation Search::unseen_with(const std::vector<Components>& columns, const NullFit& variances) const {
   return cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
 }

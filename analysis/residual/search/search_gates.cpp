@@ -37,9 +37,8 @@ std::optional<std::string> Search::only_bends(const Term& term, const NullFit& v
     if (!is_bend_over(curve, own_conditions(*term.effect, observations_), term.rotor) ||
         (!of_law && std::ranges::none_of(result_.accepted, shares)))
       continue;
-    std::vector<Components> columns = fit_.linear.columns;
-    columns.push_back(without_trend(curve, rows_).columns[0]);
-    const CrossValidation with_bend = unseen_with(columns, variances);
+    const CrossValidation with_bend =
+        unseen_with(columns_with({without_trend(curve, rows_).columns[0]}), variances);
     if (!compare(with_bend, with_term).told_apart()) return curve.covariate;
   }
   return {};
@@ -69,9 +68,7 @@ bool Search::is_gradual(const std::vector<Term>& steps, const NullFit& variances
     if (observations_.baseline_over.empty() || !is_over(curve, {observations_.baseline_over}) ||
         curve.strength || curve.rotor >= 0)
       return false;
-    std::vector<Components> with_curve = fit_.linear.columns;
-    with_curve.insert(with_curve.end(), curve.columns.begin(), curve.columns.end());
-    return !compare(unseen_with(with_curve, variances), with_steps).told_apart();
+    return !compare(unseen_with(columns_with(curve.columns), variances), with_steps).told_apart();
   });
 }
 

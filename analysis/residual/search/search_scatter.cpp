@@ -83,10 +83,7 @@ Search::ScatterBeside Search::scatter_beside(const CurveScan& curves, double lea
   };
   ScatterBeside alone = beside(fit_.linear.columns);
   if (curves.tried.empty() || curves.scan.fits[curves.scan.order[0]].evidence < least_evidence) return alone;
-  std::vector<Components> columns = fit_.linear.columns;
-  const auto& best = curves.tried[curves.scan.order[0]].columns;
-  columns.insert(columns.end(), best.begin(), best.end());
-  ScatterBeside with = beside(columns);
+  ScatterBeside with = beside(columns_with(curves.tried[curves.scan.order[0]].columns));
   // A curve may be the scatter of a few runs far out on a condition, and scatter a curve.
   const bool is_scatter = !alone.scatter.by_condition.names.empty() && likelihood(alone) > likelihood(with);
   return is_scatter ? alone : with;

@@ -23,6 +23,14 @@ struct Rotors : testing::Test {
 
   Observations observations() { return test::four_rotors(3, kRunSigma, random); }
 
+  /// Since the session's first run, a quarter between runs.
+  static VectorXd add_hours(Observations& o) {
+    VectorXd hours(o.rows());
+    for (Index row = 0; row < o.rows(); ++row) hours(row) = 0.25 * static_cast<double>(row % 8);
+    o.covariates.push_back({"hours_in_session", hours, true});
+    return hours;
+  }
+
   static std::string names(const Explanation& e) {
     std::string all;
     for (const AdoptedEffect& adopted : e.adopted) all += adopted.term.label() + "; ";
@@ -70,9 +78,7 @@ TEST_F(Rotors, WhatTwoDoIsNoNameOfAll) {
 /// Cells that each drift in their own measure: two of their own, and what all have.
 TEST_F(Rotors, WhatAllDoIsFoundBesideSingleOnes) {
   Observations o = observations();
-  VectorXd hours(o.rows());
-  for (Index row = 0; row < o.rows(); ++row) hours(row) = 0.25 * static_cast<double>(row % 8);
-  o.covariates.push_back({"hours_in_session", hours, true});
+  const VectorXd hours = add_hours(o);
   constexpr std::array<double, 4> kDrift = {0.012, 0.012, 0.05, -0.03};
   MatrixXd y = o.y;
   for (std::size_t rotor = 0; rotor < kDrift.size(); ++rotor) {
@@ -101,9 +107,7 @@ TEST_F(Rotors, TwoForcesThatAreAddedHaveNoProduct) {
   constexpr double kShare = 1, kDrift_V_per_h = 0.09;
   for (const double sign : {-1.0, 1.0}) {
     Observations o = observations();
-    VectorXd hours(o.rows());
-    for (Index row = 0; row < o.rows(); ++row) hours(row) = 0.25 * static_cast<double>(row % 8);
-    o.covariates.push_back({"hours_in_session", hours, true});
+    add_hours(o);
     test::add_covariate(o, "cable_force_N", 0, 0.8, random);
     test::add_effect(o, "cable_force", {sign * kShare});
     test::add_effect(o, "zero_drift_time", {kDrift_V_per_h});
