@@ -77,21 +77,25 @@ std::vector<Drawn> drawn_levels(const Curve& curve) {
   return points;
 }
 
-/// From x = `from` to `to`, evenly; where the rows have few values (`seen`, ascending) at these, and nowhere
-/// further from all of them than the next of the even ones: a bend may have any height in between.
-std::vector<double> places_to_draw(const std::vector<double>& seen, double from, double to) {
-  constexpr std::size_t kPoints = 25;
-  const double step = (to - from) / (kPoints - 1);
+/// From x = `from` to `to`, evenly (in ln x of waves over that); where the rows have few values (`seen`,
+/// ascending) at these, and nowhere further from all of them than the next of the even ones: a bend may have
+/// any height in between.
+std::vector<double> places_to_draw(const std::vector<double>& seen, double from, double to,
+                                   bool in_logarithm) {
+  constexpr int kPoints = 25;
+  const auto at = [&](int p) {
+    const double u = static_cast<double>(p) / (kPoints - 1);
+    return p == kPoints - 1 ? to : in_logarithm ? from * std::pow(to / from, u) : from + u * (to - from);
+  };
   std::vector<double> places;
-  if (seen.size() < kPoints)
+  if (std::ssize(seen) < kPoints)
     for (const double x : seen)
       if (x >= from && x <= to) places.push_back(x);
   if (places.size() > 1) return places;
   places.clear();
-  for (std::size_t p = 0; p < kPoints; ++p) {
-    const double x = p + 1 < kPoints ? from + static_cast<double>(p) * step : to;
-    const auto next = std::ranges::lower_bound(seen, x - step);
-    if (seen.empty() || (next != seen.end() && *next <= x + step)) places.push_back(x);
+  for (int p = 0; p < kPoints; ++p) {
+    const auto next = std::ranges::lower_bound(seen, at(p - 1));
+    if (seen.empty() || (next != seen.end() && *next <= at(p + 1))) places.push_back(at(p));
   }
   return places;
 }
@@ -255,12 +259,13 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   if (result.levels)
     pieces.push_back(drawn_levels(curve));
   else if (within)
-    pieces.push_back(drawn_curve(curve, places_to_draw({}, 0, duration_s), 0, duration_s));
+    pieces.push_back(drawn_curve(curve, places_to_draw({}, 0, duration_s, false), 0, duration_s));
   else {
     const std::vector<double> seen = values_seen(curve, rows);
+    const bool in_logarithm = has_waves(curve.shape) && is_of_logarithm(curve.shape);
     for (const Stretch& stretch : stretches_of(observations, rows, curve))
-      pieces.push_back(
-          drawn_curve(curve, places_to_draw(seen, stretch.low, stretch.high), curve.low, curve.high));
+      pieces.push_back(drawn_curve(curve, places_to_draw(seen, stretch.low, stretch.high, in_logarithm),
+                                   curve.low, curve.high));
   }
   for (std::vector<Drawn>& points : pieces) {
     if (!result.levels) take_out_baseline(observations, rows, curve, points);

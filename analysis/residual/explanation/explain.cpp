@@ -251,7 +251,9 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
     without.untestable = explanation.untestable;
     // What bends away from a formula, or is no step, is structure, and predicts as such.
     const double without_them = found.structure ? without.sealed.all : without.sealed.names;
-    const bool stay = !found.beyond && is_worse(explanation.sealed.curves, explanation.sealed.all) &&
+    const bool harmful = is_worse(explanation.sealed.names, explanation.before.held_out_rmse);
+    const bool stay = !found.beyond && !harmful &&
+                      is_worse(explanation.sealed.curves, explanation.sealed.all) &&
                       is_worse(without_them, explanation.sealed.all);
     if (stay) {
       const auto as_well = std::ranges::find_if(before, [&](const Found& earlier) {

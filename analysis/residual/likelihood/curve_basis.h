@@ -8,8 +8,10 @@
 namespace tunnelrig {
 
 enum class CurveShape {
-  kWaves,   // cos(π k u), u = (x − low)/(high − low), k = 1 …: bends of ever shorter length
+  kWaves,     // cos(π k u), u = (x − low)/(high − low), k = 1 …: bends of ever shorter length
+  kLogWaves,  // the same over ln x: what happens near the low end of a wide range
   kSmooth,  // s, s², cos(π k u), k = 1 … (Eubank & Speckman 1990): what waves have found, as it is drawn
+  kLogSmooth,    // the same over ln x
   kParabola,     // s², s = 2u − 1: what a straight line lacks; s where it stands alone
   kLogParabola,  // the same over ln x: what a power law lacks
   kLevelling,    // low/x, with s of ln x: the same, but less and less where x grows
@@ -20,6 +22,9 @@ enum class CurveShape {
 
 /// Whether s is that of ln x: then x is above 0.
 bool is_of_logarithm(CurveShape shape);
+
+/// Whether it is waves, or smooth: it ends with the range.
+bool has_waves(CurveShape shape);
 
 /// How strong a slope is that goes with another condition x: 0 at the mean of the runs, ±1 at the farthest of
 /// them, and no stronger beyond.
@@ -42,7 +47,8 @@ double tilted_column(CurveShape shape, const std::vector<double>& tilt, std::siz
 /// The k-th column (from 1) of levels: whether x is levels[k].
 double level_column(const std::vector<double>& levels, int k, double x);
 
-/// "waves", "smooth", "parabola", "log_parabola", "levelling", "straight", "log_straight", "levels".
+/// "waves", "log_waves", "smooth", "log_smooth", "parabola", "log_parabola", "levelling", "straight",
+/// "log_straight", "levels".
 std::string_view name_of(CurveShape shape);
 std::optional<CurveShape> curve_shape(std::string_view name);
 

@@ -63,7 +63,7 @@ Curve with_trend(const Curve& curve) {
   const MatrixXd straight = straight_over(curve);
   for (std::size_t k = 0; k < curve.tilt.size(); ++k) result.columns[k][0] += curve.tilt[k] * straight;
   result.tilt.clear();
-  if (curve.shape == CurveShape::kWaves) return result;  // the longest of which is a trend
+  if (has_waves(curve.shape)) return result;  // the longest of which is a trend
   Components column(curve.columns[0].size(), MatrixXd::Zero(straight.rows(), straight.cols()));
   column[0] = straight;
   result.columns.push_back(std::move(column));

@@ -52,6 +52,9 @@ Curve with_trend(const Curve& curve);
 std::vector<Curve> smooth_forms(const Observations& observations, const Curve& curve,
                                 const std::vector<int>& rows);
 
+/// A condition as the curve's s is straight in it: itself, or its logarithm.
+Covariate as_measured_along(const Covariate& covariate, CurveShape shape);
+
 /// Whether one of these covariates is what the curve is over.
 bool is_over(const Curve& curve, const std::vector<std::string>& covariates);
 

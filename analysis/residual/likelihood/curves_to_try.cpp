@@ -70,6 +70,16 @@ std::vector<CurveShape> bends_over(const Observations& observations, const Covar
   return {CurveShape::kLogParabola, CurveShape::kLevelling};
 }
 
+/// Whether what happens at the low end is one short piece of a range: an exponential, or a threshold, in 6 to
+/// 500 s.
+bool is_wide(const Covariate& covariate, const std::vector<int>& rows) {
+  constexpr double kWide = 10;
+  if (covariate.derived || covariate.name.ends_with("_C")) return false;
+  const MatrixXd values = covariate.value(rows, Eigen::all);
+  return covariate.value.minCoeff() > 0 && values.maxCoeff() > kWide * values.minCoeff() &&
+         !lowest_stands_alone(covariate, rows);
+}
+
 /// Where a curve may be seen: beyond it, in runs that are sealed, it could be anything.
 std::pair<double, double> range_of(const Covariate& covariate, const std::vector<int>& rows) {
   const MatrixXd values = covariate.value(rows, Eigen::all);
@@ -136,6 +146,10 @@ class CurvesToTry {
     for (const CurveShape bend : bends_over(observations_, covariate, rows_))
       add(covariate, over, bend, 1, with_room(rooms, 1));
     for (const int count : kBends) add(covariate, over, CurveShape::kWaves, count, with_room(rooms, count));
+    if (!is_wide(covariate, rows_)) return;
+    const std::vector<Room> of_logarithm = rooms_of(as_measured_along(covariate, CurveShape::kLogWaves));
+    for (const int count : kBends)
+      add(covariate, over, CurveShape::kLogWaves, count, with_room(of_logarithm, count));
   }
 
   /// How close a rotor's own values lie.
@@ -250,6 +264,12 @@ class CurvesToTry {
 
 }  // namespace
 
+Covariate as_measured_along(const Covariate& covariate, CurveShape shape) {
+  Covariate result = covariate;
+  if (is_of_logarithm(shape)) result.value = covariate.value.array().log();
+  return result;
+}
+
 std::vector<Curve> curves_to_try(const Observations& observations, const std::vector<int>& rows) {
   return CurvesToTry(observations, rows).take();
 }
@@ -257,9 +277,9 @@ std::vector<Curve> curves_to_try(const Observations& observations, const std::ve
 std::vector<Curve> smooth_forms(const Observations& observations, const Curve& curve,
                                 const std::vector<int>& rows) {
   const Covariate* covariate = observations.find(curve.covariate);
-  const bool bend = curve.shape == CurveShape::kParabola || is_of_logarithm(curve.shape);
-  const bool smooth = bend || curve.shape == CurveShape::kWaves || curve.shape == CurveShape::kSmooth;
-  if (covariate == nullptr || !smooth || !curve.tilt.empty() || !curve.everywhere()) return {};
+  const bool waves = has_waves(curve.shape);
+  const bool bend = curve.shape == CurveShape::kParabola || (is_of_logarithm(curve.shape) && !waves);
+  if (covariate == nullptr || !(bend || waves) || !curve.tilt.empty() || !curve.everywhere()) return {};
   const auto form_of = [&](CurveShape shape, int count) {
     Curve form = curve;
     form.shape = shape;
@@ -268,11 +288,13 @@ std::vector<Curve> smooth_forms(const Observations& observations, const Curve& c
     });
     return form;
   };
-  const int most = std::clamp(places_on_range(*covariate, rows, curve.rotor) / 3, 2, kBends.back() + 2);
+  const Covariate measured = as_measured_along(*covariate, curve.shape);
+  const CurveShape of_many = is_of_logarithm(curve.shape) ? CurveShape::kLogSmooth : CurveShape::kSmooth;
+  const int most = std::clamp(places_on_range(measured, rows, curve.rotor) / 3, 2, kBends.back() + 2);
   std::vector<Curve> forms;
-  for (int count = 1; count <= (is_of_logarithm(curve.shape) ? 2 : most); ++count) {
-    if (widest_gap(*covariate, rows, curve.rotor) * (count - 2) > 2) break;
-    forms.push_back(form_of(bend && count <= 2 ? curve.shape : CurveShape::kSmooth, count));
+  for (int count = 1; count <= (bend && is_of_logarithm(curve.shape) ? 2 : most); ++count) {
+    if (widest_gap(measured, rows, curve.rotor) * (count - 2) > 2) break;
+    forms.push_back(form_of(bend && count <= 2 ? curve.shape : of_many, count));
   }
   return forms;
 }

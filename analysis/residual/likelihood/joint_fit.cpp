@@ -14,12 +14,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-bool is_at_bound(const Term& term, std::size_t k) {
-  const EffectParameter& parameter = term.effect->parameters[k];
-  const double margin = 1e-6 * (parameter.upper - parameter.lower);
-  return term.parameters[k] <= parameter.lower + margin || term.parameters[k] >= parameter.upper - margin;
-}
-
 /// Where a parameter of the model stands.
 struct FreeParameter {
   std::size_t term = 0, parameter = 0;
@@ -336,6 +330,12 @@ MeanModel refit(const Observations& observations, const MeanModel& start, const 
     if (has_settled(before, model)) break;
   }
   return model;
+}
+
+bool is_at_bound(const Term& term, std::size_t k) {
+  const EffectParameter& parameter = term.effect->parameters[k];
+  const double margin = 1e-6 * (parameter.upper - parameter.lower);
+  return term.parameters[k] <= parameter.lower + margin || term.parameters[k] >= parameter.upper - margin;
 }
 
 bool at_bound(const JointFit& fit, const Term& term) {

@@ -58,6 +58,9 @@ struct JointFit {
   bool converged = true;
 };
 
+/// Whether parameter k is where physics ends.
+bool is_at_bound(const Term& term, std::size_t k);
+
 /// Whether a term's amplitude has come to the end of its physical bounds.
 bool at_bound(const JointFit& fit, const Term& term);
 

@@ -80,6 +80,9 @@ class Search {
   /// block-out losses; `gain`: theirs on those without the term.
   std::optional<std::string> why_not(const JointFit& fit, const CrossValidation& after,
                                      const LossDifference& gain) const;
+  /// An effect over a condition of the model's last that is, together with that, no more than a small part of
+  /// either: two formulas that differ little make any shape over it. None: null. Of `fit`.
+  const Term* cancelled_by_newest(const JointFit& fit) const;
   /// The covariate that an effect shares with an accepted one, if a bend over it predicts unseen blocks about
   /// as well: what two names over one covariate do together, a curve does too, and their sum is no evidence
   /// of a second cause.

@@ -25,6 +25,13 @@ constexpr double kLittle_other = 0.02;
 /// Of the range of speeds, without a run in it.
 constexpr double kSpeedsApart = 0.5;
 
+/// Whether it has a time constant or a length that is not at its bound, where a formula is what it is.
+bool can_bend(const Term& term) {
+  for (std::size_t k = 1; k < term.parameters.size(); ++k)
+    if (!is_at_bound(term, k)) return true;
+  return false;
+}
+
 }  // namespace
 
 void Search::add_curves(const CurveScan& first) {
@@ -127,7 +134,8 @@ void Search::smooth_curves(std::size_t first) {
     for (const Curve& form : forms) candidates.push_back(as_candidate(form));
     const auto fits =
         CandidateScan(*mixed_, without.linear.columns, candidates).fit(difference(y_, without.linear.offset));
-    const double n = places_on_range(*observations_.find(forms[0].covariate), rows_, forms[0].rotor);
+    const Covariate measured = as_measured_along(*observations_.find(forms[0].covariate), forms.back().shape);
+    const double n = places_on_range(measured, rows_, forms[0].rotor);
     const auto criterion = [&](std::size_t i) {   // Hurvich & Tsai 1989
       const auto k = static_cast<double>(i + 2);  // columns and a constant
       return 2 * (k + 1) * n / std::max(n - k - 2, 1.0) - 2 * fits[i].likelihood_ratio;
@@ -237,7 +245,7 @@ bool Search::outshone_by_curve(const Term& term) const {
   const Eigen::MatrixXd made = respond(term, observations_, predicted).value[0];
   // Over a condition that tells the effect's own, a curve may be large only because the two cancel.
   if (!over_its_own && share_beside(curve, term, made, predicted) >= kLittle_other) return false;
-  const double most = term.effect->parameters.size() > 1 ? kMostLeft_bending : kMostLeft;
+  const double most = can_bend(term) ? kMostLeft_bending : kMostLeft;
   return rms_of(made_by_newest_curve()) > most * rms_of(made);
 }
 

@@ -282,6 +282,8 @@ std::optional<std::string> Search::why_not(const JointFit& fit, const CrossValid
     return fmt::format("{} without rotor_speed is no way of the speed", term.label());
   if (const auto shared = only_bends(term, fit.variances, after))
     return fmt::format("{} is no more than a bend over {}", term.label(), *shared);
+  if (const Term* other = cancelled_by_newest(fit))
+    return fmt::format("{} and {} would cancel each other", term.label(), other->label());
   if (term.effect->has_change_point() && is_gradual({term}, fit.variances, after))
     return fmt::format("{} is no better than a gradual change", term.label());
   return std::nullopt;
