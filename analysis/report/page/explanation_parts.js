@@ -10,11 +10,10 @@ function digits(value, n = 3) {
   return (value < 0 ? '−' : '') + text;
 }
 
-/** No p is below one over the simulated data sets and one: there it is a bound. The report does not know their number. */
-const digitsOfP = (p) => {
-  const {simulations} = report.settings ?? {};
-  return (known(p) && p * (simulations + 1) < 1.001 ? '≤ ' : '') + digits(p);
-};
+/** No p is below one over the simulated data sets and one: there it is a bound. The report knows no number of them. */
+const isLeastP = (p) => known(p) && p * (report.settings?.simulations + 1) < 1.001;
+const digitsOfP = (p) => (isLeastP(p) ? '≤ ' : '') + digits(p);
+const sayP = (p) => `p ${isLeastP(p) ? '≤' : '='} ${digits(p)}`;
 
 const bracket = ([low, high]) => `[${digits(low)}, ${digits(high)}]`;
 const unitSuffix = (unit) => (unit && unit !== '1' ? ` ${unit}` : '');
@@ -160,6 +159,6 @@ const unknownText = (unknown, unit) => {
   const twins = unknown.collinear_with?.length ? ` Not to be told from ${unknown.collinear_with.join(', ')}.` : '';
   const where = `${rotor ? ` at rotor ${rotor}` : ''}${placeText(place)}${timesText(times)}`;
   return `Depends on \`${covariate}\`${where}: amplitude ${digits(amplitude)}${
-      unitSuffix(unit)}, p ${digitsOfP(p).replace(/^(?!≤)/, '= ')}. A shape, not a cause.${twins}${bySealed}${names}${labelsText(unknown, unit)}${
+      unitSuffix(unit)}, ${sayP(p)}. A shape, not a cause.${twins}${bySealed}${names}${labelsText(unknown, unit)}${
       insteadOf.length ? ` It bends away from the formula of ${insteadOf.join(', ')}.` : ''}`;
 };

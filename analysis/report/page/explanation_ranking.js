@@ -43,7 +43,7 @@ function drawRanking({ranking, critical}) {
       x: best.map((r) => Math.max(0, r.evidence)),
       y: best.map((_, i) => i),
       marker: {color: best.map((r) => (r.evidence >= critical ? blue : style('--soft')))},
-      text: best.map((r) => `${plain(r.label)}<br>evidence ${digits(r.evidence)}, p ${digitsOfP(r.p).replace(/^(?!≤)/, '= ')}`),
+      text: best.map((r) => `${plain(r.label)}<br>evidence ${digits(r.evidence)}, ${sayP(r.p)}`),
       textposition: 'none',
       hovertemplate: '%{text}<extra></extra>'
     }],
