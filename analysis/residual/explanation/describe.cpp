@@ -121,10 +121,9 @@ MatrixXd stacked(const std::vector<Components>& columns, const std::vector<int>&
 /// Of stacked columns, what the groups' constants and slopes cannot make.
 MatrixXd beside_baseline(const Observations& observations, const std::vector<int>& rows, MatrixXd columns) {
   const auto n = static_cast<Index>(rows.size());
-  const MatrixXd slopes = observations.slopes(rows, Eigen::all);
+  const MatrixXd all = observations.baseline_columns(rows);
   for (const auto& [group, own] : places_of_each(observations.group, rows)) {
-    MatrixXd baseline(static_cast<Index>(own.size()), 1 + slopes.cols());
-    baseline << VectorXd::Ones(baseline.rows()), slopes(own, Eigen::all);
+    const MatrixXd baseline = all(own, Eigen::all);
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(baseline);
     for (Index channel = 0; channel < observations.channels(); ++channel) {
       auto part = columns.middleRows(channel * n, n);
@@ -280,22 +279,22 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
   return result;
 }
 
-UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual, int rotor,
-                                   const std::vector<int>& rows) {
+UnknownStructure describe_sessions(const Observations& observations, const MatrixXd& residual,
+                                   const SessionScatter& scatter, const std::vector<int>& rows) {
   UnknownStructure result{.covariate = "session",
                           .condition = "session",
                           .covariate_unit = {},
                           .place = {},
                           .times = {},
-                          .rotor = rotor,
-                          .p_value = 0.025,
+                          .rotor = scatter.rotor,
+                          .p_value = scatter.p,
                           .shape = {},
                           .labels = {},
                           .instead_of = {}};
   std::map<int, std::vector<double>> offsets;
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const auto run = residual.row(static_cast<Index>(r));
-    const double mean = rotor < 0 ? -run.mean() : -run(rotor);
+    const double mean = scatter.rotor < 0 ? -run.mean() : -run(scatter.rotor);
     if (!std::isnan(mean)) offsets[observations.block[static_cast<std::size_t>(rows[r])]].push_back(mean);
   }
   const auto mean_of = [](const std::vector<double>& values) {

@@ -103,6 +103,7 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
   if (aside_too) {
     aside.take(rows);
     explanation = explain_once(aside.kept, effects, settings);
+    explanation.seal_chose = true;
   }
   for (const IsolatedValue& value : isolated)
     said.push_back(in_words(value, aside_too
@@ -239,6 +240,7 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
                             std::vector<const Effect*>& effects, SearchSettings& settings,
                             std::vector<std::string>& said) {
   std::vector<Found> before;
+  const bool chosen = explanation.seal_chose || refuted(explanation, observations).any();
   for (Refuted found = refuted(explanation, observations); found.any();
        found = refuted(explanation, observations)) {
     std::vector<const Effect*> fewer = effects;
@@ -264,7 +266,8 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
       say(as_well->refuted, true, said);
       effects = std::move(as_well->effects);
       settings = std::move(as_well->settings);
-      return std::move(as_well->explanation);
+      explanation = std::move(as_well->explanation);
+      break;
     }
     before.push_back({std::move(explanation), found, effects, settings, said.size()});
     if (found.all) said.push_back(taken_back_all(before.back().explanation));
@@ -273,6 +276,7 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
     effects = std::move(fewer);
     settings = std::move(stricter);
   }
+  explanation.seal_chose = chosen;
   return explanation;
 }
 
@@ -349,6 +353,11 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
   SearchSettings unrefuted = settings;
   explanation = without_refuted(std::move(explanation), aside.kept, left, unrefuted, said);
   explanation = without_names_of_incomplete(std::move(explanation), aside.kept, left, unrefuted, said);
+  explanation.seal_chose = explanation.seal_chose && !explanation.adopted.empty();
+  if (explanation.seal_chose)
+    said.push_back(
+        "the sealed blocks had a part in what is adopted: their error after is no longer one of "
+        "blocks that nobody has looked at");
   explanation.warnings.insert(explanation.warnings.begin(), said.begin(), said.end());
   explanation.suspect_rows.insert(explanation.suspect_rows.begin(), aside.rows.begin(), aside.rows.end());
   return explanation;

@@ -42,7 +42,7 @@ struct ParameterEstimate {
 struct SeparatingRun {
   std::map<std::string, double> setting;  // covariates to set
   std::string location;                   // empty: any
-  double expected_sigma = 0;              // distance of the predictions over the scatter of one run
+  double expected_sigma = 0;              // distance of the predictions over the scatter of a pair of runs
   std::string text;
 };
 
@@ -109,6 +109,8 @@ struct Explanation {
   int model_in_force = 0;  // version that reduce goes by, while `baseline` is the thesis's
   ErrorEstimate before, after;
   SealedErrors sealed;
+  bool seal_chose = false;  // the sealed blocks had a part in what is adopted: their errors are no longer of
+                            // what nobody has looked at
   std::vector<AdoptedEffect> adopted;
   std::vector<UnknownStructure> unknown;
   std::vector<Untestable> untestable;

@@ -81,6 +81,7 @@ std::string explanation_json(const Explanation& e) {
             {"baseline", e.baseline},
             {"verdict", e.verdict},
             {"noise_floor", finite(e.noise_floor)},
+            {"seal_chose", e.seal_chose},
             {"blocks", e.blocks},
             {"runs", e.runs},
             {"model_in_force", e.model_in_force},

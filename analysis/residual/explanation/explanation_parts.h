@@ -152,7 +152,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
 /// Session scatter that no covariate explains: the sessions' offsets themselves are the shape. Of a rotor;
 /// −1: of the rotors' mean.
 UnknownStructure describe_sessions(const Observations& observations, const Eigen::MatrixXd& residual,
-                                   int rotor, const std::vector<int>& rows);
+                                   const SessionScatter& scatter, const std::vector<int>& rows);
 
 // --- suspects.cpp
 

@@ -188,7 +188,7 @@ std::string explanation_text(const Explanation& e) {
   if (e.model_in_force > 0)
     text +=
         wrapped(fmt::format("model version {} is in force for reduce, map and report; explain starts anew "
-                            "from the baseline {}, and finds again what that version holds",
+                            "from the baseline {}",
                             e.model_in_force, e.baseline));
   text += fmt::format("\n{}: {}\n", e.verdict, verdict_in_words(e));
   for (const AdoptedEffect& adopted : e.adopted) text += in_words(adopted);

@@ -110,6 +110,7 @@ Explanation without_names_of_incomplete(Explanation explanation, const Observati
       if (effect->theory_only || is_found_there(*effect)) left.push_back(effect);
     Explanation again = explain_once(observations, left, settings);
     again.untestable = std::move(explanation.untestable);
+    again.seal_chose = explanation.seal_chose;
     explanation = std::move(again);
   }
   for (UnknownStructure& unknown :

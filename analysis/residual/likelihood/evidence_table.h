@@ -14,12 +14,12 @@ namespace tunnelrig {
 /// times.
 class EvidenceTable {
  public:
-  EvidenceTable(int columns, double observations) {
+  EvidenceTable(int columns, double degrees_of_freedom) {
     const double k = columns;
     for (std::size_t i = 0; i < kEntries; ++i) {
       const double ratio = kStep * static_cast<double>(i);
-      const double f = std::expm1(2 * ratio / observations) * (observations - k) / k;
-      const double p = f_upper_p(f, k, observations - k);
+      const double f = std::expm1(2 * ratio / degrees_of_freedom) * (degrees_of_freedom - k) / k;
+      const double p = f_upper_p(f, k, degrees_of_freedom - k);
       entries_[i] = p > 1e-290 ? -std::log10(p) : entries_[i - 1] + kStep / std::numbers::ln10;
     }
   }

@@ -95,19 +95,14 @@ class RunCovariance {
 void own_baseline(const Observations& observations, const std::vector<int>& rows,
                   const RunCovariance& covariance, const MatrixXd& plain, const Stacked& columns,
                   const MatrixXd& of_amplitudes, MatrixXd& residual, MatrixXd& variance) {
+  const MatrixXd design = observations.baseline_columns(rows);
   for (auto& [group, members] : places_of_each(observations.group, rows)) {
     std::erase_if(members, [&](Index r) { return !std::isnan(residual(r, 0)); });
     std::vector<Index> fitted, scored;
     for (std::size_t m = 0; m < members.size(); ++m) (m % 2 == 0 ? fitted : scored).push_back(members[m]);
-    const auto design = [&](const std::vector<Index>& of) {
-      MatrixXd x(static_cast<Index>(of.size()), 1 + observations.slopes.cols());
-      for (std::size_t m = 0; m < of.size(); ++m)
-        x.row(static_cast<Index>(m)) << 1, observations.slopes.row(rows[static_cast<std::size_t>(of[m])]);
-      return x;
-    };
     const MatrixXd of_fitted = covariance(fitted, fitted), shared = covariance(scored, fitted);
     const VectorXd weight = covariance.of_runs(fitted).cwiseInverse();
-    const MatrixXd x = weight.asDiagonal() * design(fitted), wanted = design(scored);
+    const MatrixXd x = weight.asDiagonal() * design(fitted, Eigen::all), wanted = design(scored, Eigen::all);
     if (x.rows() < x.cols()) continue;
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(x);
     const MatrixXd share = wanted * solver.pseudoInverse() * weight.asDiagonal();  // of each fitted run
@@ -160,8 +155,7 @@ Index HeldOutErrors::count() const { return error.size() - error.array().isNaN()
 AmplitudeFit fit_amplitudes(const Observations& observations, const Components& y,
                             const std::vector<Components>& columns, const NullFit& null,
                             const std::vector<int>& rows) {
-  std::vector<const Components*> items;
-  for (const Components& column : columns) items.push_back(&column);
+  const std::vector<const Components*> items = pointers_to(columns);
   const Fit fit = fit_amplitudes(MixedModel(observations, rows, null.ratio), y, items, null);
   return {fit.amplitude, fit.covariance};
 }
@@ -171,8 +165,7 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
                                const std::vector<int>& fit_rows, const std::vector<int>& test_rows) {
   const MixedModel model(observations, fit_rows, null.ratio);
   const MixedModel test = MixedModel::baseline_alone(observations, test_rows);
-  std::vector<const Components*> items;
-  for (const Components& column : columns) items.push_back(&column);
+  const std::vector<const Components*> items = pointers_to(columns);
   const Fit fit = fit_amplitudes(model, y, items, null);
   const Index n = static_cast<Index>(test_rows.size()), c = observations.channels();
   HeldOutErrors result{test_rows, MatrixXd::Zero(n, c), MatrixXd::Zero(n, c), {}, fit.amplitude};
@@ -281,15 +274,16 @@ VectorXd CrossValidation::losses() const {
 
 LossDifference compare(const CrossValidation& worse, const CrossValidation& better) {
   VectorXd difference = worse.losses() - better.losses();
-  // Where one of them has too few runs for its coefficients, they are not held against the same runs.
+  double distance2 = 0;
   for (std::size_t fold = 0; fold < worse.folds.size(); ++fold)
-    if (worse.folds[fold].count() != better.folds[fold].count()) difference(static_cast<Index>(fold)) = 0;
+    // Where one of them has too few runs for its coefficients, they are not held against the same runs.
+    if (worse.folds[fold].count() != better.folds[fold].count())
+      difference(static_cast<Index>(fold)) = 0;
+    else
+      distance2 += (worse.folds[fold].whitened - better.folds[fold].whitened).squaredNorm();
   const double n = static_cast<double>(difference.size());
   LossDifference result{.mean = difference.mean(), .total = difference.sum()};
   result.standard_error = std::sqrt((difference.array() - result.mean).square().sum() / (n * (n - 1)));
-  double distance2 = 0;
-  for (std::size_t fold = 0; fold < worse.folds.size(); ++fold)
-    distance2 += (worse.folds[fold].whitened - better.folds[fold].whitened).squaredNorm();
   result.expected_standard_error = 2 * std::sqrt(distance2) / n;
   return result;
 }

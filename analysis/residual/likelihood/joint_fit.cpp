@@ -104,8 +104,8 @@ class Residuals : public ceres::CostFunction {
     for (std::size_t i = 0; i < free_.size(); ++i)
       model.terms[free_[i].term].parameters[free_[i].parameter] = parameters[0][i];
     const LinearModel linear = linearise(observations_, {model.terms, {}}, forces_, Shapes::kAll);
-    std::vector<const Components*> items = {&linear.offset};
-    for (const Components& column : linear.columns) items.push_back(&column);
+    std::vector<const Components*> items = pointers_to(linear.columns);
+    items.insert(items.begin(), &linear.offset);
     const MatrixXd whitened = whitener_(items);
     Eigen::Map<VectorXd>(residuals, y_.size()) = y_ - whitened.col(0);
     if (jacobians != nullptr && jacobians[0] != nullptr) {
@@ -214,7 +214,7 @@ MatrixXd along_slopes(const Observations& observations, const MatrixXd& residual
     const MatrixXd slope = (x.rowwise() - middle)
                                .completeOrthogonalDecomposition()
                                .solve(MatrixXd(y.rowwise() - y.colwise().mean()));
-    const Eigen::RowVectorXd from = observations.is_line() ? Eigen::RowVectorXd::Zero(x.cols()) : middle;
+    const Eigen::RowVectorXd from = observations.line_of_cell ? Eigen::RowVectorXd::Zero(x.cols()) : middle;
     for (const Index row : all.at(group)) result.row(row) = (observations.slopes.row(row) - from) * slope;
   }
   return result;
@@ -237,7 +237,7 @@ MatrixXd on_baseline(const Observations& observations, const MatrixXd& residual,
     const Index group = observations.group[static_cast<std::size_t>(row)];
     Eigen::RowVectorXd constant =
         count(group) > 0 ? Eigen::RowVectorXd(sum.row(group) / count(group)) : overall;
-    if (observations.is_line()) constant.setZero();
+    if (observations.line_of_cell) constant.setZero();
     Eigen::ArrayXXd y = constant + added.row(row);
     if (observations.multiplicative) y = y.exp();
     predicted.row(row) = observations.known.row(row).array() * y;

@@ -48,8 +48,7 @@ std::vector<MatrixXd> MixedModel::sizes_left(const std::vector<std::size_t>& rat
   constexpr double kLeastLeft = 1e-6;  // of the only run at a location nothing is: what there is, is rounding
   constexpr double kMostTaken = 0.9;
   const Index n = static_cast<Index>(rows_.size()), count = static_cast<Index>(columns.size());
-  std::vector<const Components*> items;
-  for (const Components& column : columns) items.push_back(&column);
+  const std::vector<const Components*> items = pointers_to(columns);
   std::vector<Stacked> projected(strata_.size());
   MatrixXd information = MatrixXd::Zero(count, count);
   for (std::size_t s = 0; s < strata_.size(); ++s) {

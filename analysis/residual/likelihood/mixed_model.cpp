@@ -180,9 +180,7 @@ const MixedModel::Prepared& MixedModel::prepared(std::size_t stratum, std::size_
 void MixedModel::set_groups() {
   const Index each = 1 + observations_.slopes.cols();
   for (const auto& [number, rows] : rows_of_each(observations_.group, rows_)) {
-    MatrixXd columns(static_cast<Index>(rows.size()), each);
-    columns << Eigen::VectorXd::Ones(columns.rows()), observations_.slopes(rows, Eigen::all);
-    const Eigen::ColPivHouseholderQR<MatrixXd> qr(columns);
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(observations_.baseline_columns(rows));
     const Index rank = qr.rank();
     const MatrixXd r = qr.matrixQR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
     GroupBaseline& group = groups_[number];
@@ -204,9 +202,7 @@ void MixedModel::set_groups() {
 }
 
 Eigen::RowVectorXd MixedModel::baseline_row(const GroupBaseline& group, int row) const {
-  Eigen::RowVectorXd plain(1 + observations_.slopes.cols());
-  plain << 1, observations_.slopes.row(row);
-  return plain * group.to_orthonormal;
+  return observations_.baseline_columns(std::array{row}) * group.to_orthonormal;
 }
 
 MixedModel::NormalParts MixedModel::normal_parts(double run_correlation) const {

@@ -10,8 +10,7 @@ using Eigen::MatrixXd;
 ScanProducts::ScanProducts(const MixedModel& model, const std::vector<Components>& adopted,
                            const std::vector<Candidate>& candidates)
     : model_(model), adopted_(static_cast<Index>(adopted.size())) {
-  std::vector<const Components*> items;
-  for (const Components& column : adopted) items.push_back(&column);
+  std::vector<const Components*> items = pointers_to(adopted);
   for (const Candidate& candidate : candidates) {
     first_.push_back(static_cast<Index>(items.size()));
     for (const Components& column : candidate.columns) items.push_back(&column);

@@ -90,7 +90,7 @@ class Evaluation {
 
  private:
   double force_of(Index row, Index channel) const {
-    return predicted_(row, channel) * (observations_.sign.size() > 0 ? observations_.sign(row) : 1);
+    return observations_.signed_force_N(predicted_(row, channel), row);
   }
 
   Sample sample_of(Index row, Index channel) {
@@ -157,6 +157,12 @@ class Evaluation {
 };
 
 }  // namespace
+
+std::vector<const Components*> pointers_to(const std::vector<Components>& columns) {
+  std::vector<const Components*> result;
+  for (const Components& column : columns) result.push_back(&column);
+  return result;
+}
 
 std::string Term::label() const { return effect->label(rotor, other) + (per_group ? " per group" : ""); }
 

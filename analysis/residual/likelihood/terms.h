@@ -34,6 +34,9 @@ std::vector<std::size_t> order_of_action(const std::vector<Term>& terms);
 /// their course.
 using Components = std::vector<Eigen::MatrixXd>;
 
+/// As `MixedModel::stack` takes them; they are those of `columns`.
+std::vector<const Components*> pointers_to(const std::vector<Components>& columns);
+
 /// What a term adds to y, and the derivative by each of its parameters.
 struct TermResponse {
   Components value;

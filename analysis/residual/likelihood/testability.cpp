@@ -92,7 +92,7 @@ Testability by_conditions(const Effect& effect, const Observations& observations
 
 /// Why the response is none that the origin of the effect would change, or none that would show it.
 std::string against_origin(const Effect& effect, const Observations& observations) {
-  const bool number = observations.of_no_cell && !observations.is_line();
+  const bool number = observations.of_no_cell && !observations.line_of_cell;
   const bool power = is_of("power", observations);
   constexpr auto kNumber =
       "nothing says that a cell read the response, or that the air is in it: it is a number without a "
@@ -106,7 +106,7 @@ std::string against_origin(const Effect& effect, const Observations& observation
       return number ? kNumber : "";
     case EffectOrigin::kAirTemperature:
       if (number) return kNumber;
-      if (observations.of_air && !observations.is_line()) return "";
+      if (observations.of_air && !observations.line_of_cell) return "";
       return "only a table's thrust, coefficient, power or torque is held against a baseline without "
              "the density of its air";
     case EffectOrigin::kAirHumidity:
@@ -132,7 +132,7 @@ std::string against_origin(const Effect& effect, const Observations& observation
                  ? "it acts by the speed, which is a part of the response"
                  : "";
     case EffectOrigin::kMotor:
-      return observations.is_line() ? "a load that a cell was given has no motor" : "";
+      return observations.line_of_cell ? "a load that a cell was given has no motor" : "";
     case EffectOrigin::kOffset:
       if (shows_zero_offset(observations)) return "";
       return is_made_c_t(observations) && !observations.multiplicative
@@ -177,7 +177,7 @@ std::vector<std::string> own_conditions(const Effect& effect, const Observations
 }
 
 bool goes_by_the_law_alone(const Effect& effect, const Observations& observations) {
-  if (observations.baseline_over.empty() || observations.is_line()) return false;
+  if (observations.baseline_over.empty() || observations.line_of_cell) return false;
   const std::vector<std::string> by = own_conditions(effect, observations);
   const Covariate* over = observations.find(observations.baseline_over);
   const Covariate* own = by.size() == 1 ? observations.find(by[0]) : nullptr;

@@ -43,10 +43,13 @@ class AtZero {
     MatrixXd result = MatrixXd::Constant(covariate.value.rows(), covariate.value.cols(), kNoTare);
     for (Index row = 0; row < result.rows(); ++row)
       for (Index channel = 0; channel < result.cols() && coefficients(row).tare; ++channel) {
-        double sum = 0;
-        for (const TareZero::Weight& weight : coefficients(row).tare->weights)
-          sum += weight.weight * at_tare(covariate, tares_[weight.tare], row, channel);
-        result(row, channel) = sum;
+        // From the first tare's on: of equal values the mean is that value, and nothing is left of rounding.
+        const std::vector<TareZero::Weight>& weights = coefficients(row).tare->weights;
+        const double first = at_tare(covariate, tares_[weights.front().tare], row, channel);
+        result(row, channel) = first;
+        for (const TareZero::Weight& weight : weights)
+          result(row, channel) +=
+              weight.weight * (at_tare(covariate, tares_[weight.tare], row, channel) - first);
       }
     return result;
   }

@@ -160,9 +160,19 @@ struct Observations {
   std::map<std::string, std::string> left_out_for;  // covariate: why runs are left out for it
   std::vector<std::string> left_out;                // "run: reason", and what else is wrong with runs
 
-  bool line_of_cell = false;            // a linear baseline that is over what a cell is loaded with
+  /// v = b + g T of a cell, a linear baseline that is over what it is loaded with: what it reads without a
+  /// load is no force. A thrust over a condition has none.
+  bool line_of_cell = false;
   std::string baseline_over;            // covariate that a table's line or power law is over; or empty
   std::vector<std::string> other_axes;  // covariates of a linear baseline's quantity
+
+  /// [1 slopes] of rows: what a group's constant and slopes are multiplied by.
+  template <class Rows>
+  Eigen::MatrixXd baseline_columns(const Rows& rows) const {
+    Eigen::MatrixXd columns(static_cast<Eigen::Index>(rows.size()), 1 + slopes.cols());
+    columns << Eigen::VectorXd::Ones(columns.rows()), slopes(rows, Eigen::all);
+    return columns;
+  }
 
   Eigen::Index first_own_slope() const { return slopes.cols() - beyond.cols(); }
   Eigen::Index rows() const { return y.rows(); }
@@ -170,8 +180,6 @@ struct Observations {
   int groups() const { return static_cast<int>(group_name.size()); }
   int blocks() const { return static_cast<int>(block_name.size()); }
   std::vector<int> all_rows() const;
-  /// v = b + g T of a cell: what it reads without a load is no force. A thrust over a condition has none.
-  bool is_line() const { return line_of_cell; }
   const Covariate* find(std::string_view wanted) const {
     for (const Covariate& covariate : covariates)
       if (covariate.name == wanted) return &covariate;
@@ -191,6 +199,10 @@ struct Observations {
   Observations without_responses_but(const std::vector<int>& rows) const;
   /// What a small change of y is of the response, on the whole.
   double response_per_y() const { return multiplicative ? value.cwiseAbs().mean() : known.mean(); }
+  /// Of a channel, from its magnitude.
+  double signed_force_N(double size_N, Eigen::Index row) const {
+    return sign.size() > 0 ? size_N * sign(row) : size_N;
+  }
   bool has_response(Eigen::Index row) const { return !std::isnan(y(row, 0)); }
 };
 

@@ -30,7 +30,7 @@ MatrixXd variance_of_constants(const Observations& observations, const MatrixXd&
   VectorXd count = VectorXd::Zero(observations.groups());
   for (Index row = 0; row < observations.rows(); ++row)
     if (observations.has_response(row)) count(observations.group[static_cast<std::size_t>(row)]) += 1;
-  if (observations.is_line()) {  // its force has no zero, which is no scatter
+  if (observations.line_of_cell) {  // its force has no zero, which is no scatter
     const MatrixXd seen = left.array().isNaN().select(0, left);
     MatrixXd sum = MatrixXd::Zero(observations.groups(), left.cols());
     for (Index row = 0; row < left.rows(); ++row)
@@ -52,7 +52,7 @@ PreviousRun::PreviousRun(const Observations& observations, const MatrixXd& predi
       constant_variance_(variance_of_constants(observations, predicted)) {}
 
 double PreviousRun::force_of(Index row, Index channel) const {
-  return predicted_(row, channel) * (observations_.sign.size() > 0 ? observations_.sign(row) : 1);
+  return observations_.signed_force_N(predicted_(row, channel), row);
 }
 
 double PreviousRun::force_N(Index row, Index channel) const {

@@ -15,8 +15,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Variance of what each rotor's runs have of their own, whatever they have in common; those of `alike` share
-/// one. A rotor's distance from the mean of all, weighted by 1/d_i, has the variance d_i − 1/Σ(1/d): a fixed
-/// point.
+/// one. A rotor's distance from the mean of all, weighted by 1/v_i, has the variance v_i − 1/Σ(1/v), v_i the
+/// rotor's own: a fixed point.
 VectorXd own_variances(const MatrixXd& rotors, const std::vector<Index>& alike) {
   constexpr int kIterations = 30;
   constexpr double kLeast = 0.05;  // of the second smallest: a single rotor's may be estimated as none

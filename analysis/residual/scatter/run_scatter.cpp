@@ -74,8 +74,7 @@ void let_differ(const std::vector<int>& number, const std::vector<int>& rows, co
 
 RunSizes run_sizes(const MixedModel& model, const NullFit& variances, const Components& y,
                    const std::vector<Components>& columns, std::mt19937_64& random) {
-  std::vector<const Components*> items;
-  for (const Components& column : columns) items.push_back(&column);
+  const std::vector<const Components*> items = pointers_to(columns);
   const auto k = static_cast<Index>(items.size()), n = static_cast<Index>(model.rows().size());
   std::vector<Stacked> data, fitted;  // of each stratum: the measured and the drawn, and the columns
   MatrixXd information = MatrixXd::Zero(k, k), products = MatrixXd::Zero(k, 1 + kAlikeSets);

@@ -51,8 +51,7 @@ StructureLeft Search::run_on_top_of(const Attribution& found, const JointFit& wh
   result_.curves = found.curves;
   fit_ = whole;
   read_back_terms();
-  constexpr std::uint64_t kOther = 2000;
-  salt_ = kOther;  // other data sets than the search before has drawn
+  questions_ = kDrawsOnAllRuns;  // other data sets than the search before has drawn
   StructureLeft left;
   for (std::size_t t = 0; t < result_.accepted.size(); ++t)
     if (bends_away(t)) left.bent.insert(t);

@@ -46,6 +46,7 @@ struct Round {
 struct Accepted {
   Term term;
   double p = 1;
+  bool together = false;           // found with others, none of which is seen alone
   double gain = 0;                 // fall of the leave-one-block-out error, response's unit
   std::vector<Ranked> confounded;  // one way of each effect that does as well
 };
@@ -63,12 +64,17 @@ struct FoundCurve {
   std::vector<Term> could_be = {};      // one way of each effect that may do as well, and is not accepted
 };
 
+/// Sessions scatter far more than runs.
+struct SessionScatter {
+  int rotor = -1;  // −1: what several do
+  double p = 1;    // of no more than the ratio that is asked for, by the likelihood over the grid
+};
+
 struct Attribution {
   std::vector<Accepted> accepted;
   std::vector<FoundCurve> curves;
   std::vector<BeyondBounds> beyond_bounds;
-  /// Sessions scatter far more than runs: of which rotor, −1 for what several do.
-  std::optional<int> session_unknown = {};
+  std::optional<SessionScatter> session_unknown = {};
   JointFit baseline, final;   // without and with the accepted terms and curves
   Observations observations;  // what `final` speaks of: with a group's own amplitudes among its baseline
   std::vector<Round> rounds, curve_rounds;

@@ -48,9 +48,7 @@ double likelihood_beside_own(const Observations& observations, const NullFit& fi
                              const std::vector<int>& rows) {
   double log_size = 0;
   for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
-    MatrixXd columns(static_cast<Index>(own.size()), 1 + observations.slopes.cols());
-    columns << VectorXd::Ones(columns.rows()), observations.slopes(own, Eigen::all);
-    const Eigen::ColPivHouseholderQR<MatrixXd> qr(columns);
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(observations.baseline_columns(own));
     log_size += qr.matrixR().diagonal().head(qr.rank()).array().abs().log().sum();
   }
   return fit.log_likelihood + log_size;
@@ -179,7 +177,7 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
   for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
     const Index n = static_cast<Index>(own.size()), k = observations.slopes.cols();
     MatrixXd items(n, k + 2);  // constant and other columns, then x and y
-    items << VectorXd::Ones(n), observations.slopes(own, Eigen::all), left_of_y(own);
+    items << observations.baseline_columns(own), left_of_y(own);
     items.col(1 + column).swap(items.col(k));
     whiten(without_numbers(places_of_each(observations.block, own)), observations.scatter.of_runs(own),
            kRatios[variances.ratio[0]], correlation_within(observations, own), items);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "analysis/residual/search/attribution.h"
+#include "analysis/residual/search/draws.h"
 
 #include <algorithm>
 #include <cmath>
@@ -24,8 +25,11 @@ inline double critical_of(std::vector<double> maxima, double alpha) {
 /// without effect costs little, and never before the p that was asked for is settled (Besag & Clifford 1991).
 class DrawnMaxima {
  public:
-  DrawnMaxima(const CandidateScan& scan, NullFit null, const SearchSettings& settings, std::uint64_t salt)
-      : scan_(scan), null_(std::move(null)), settings_(settings), random_(settings.seed * 1000003 + salt) {}
+  DrawnMaxima(const CandidateScan& scan, NullFit null, const SearchSettings& settings, std::uint64_t stream)
+      : scan_(scan),
+        null_(std::move(null)),
+        settings_(settings),
+        random_(random_numbers(settings.seed, stream)) {}
 
   double p(double evidence) {
     constexpr std::size_t kBatch = 111, kEnough = 30;
@@ -65,12 +69,11 @@ class NullMaxima {
  public:
   /// `sizes`: see NullFit; empty: normal scatter alone.
   NullMaxima(const CandidateScan& scan, NullFit null, std::vector<Eigen::MatrixXd> sizes,
-             const SearchSettings& settings, std::uint64_t salt)
-      : normal_(scan, null, settings, salt), alpha_(settings.alpha) {
+             const SearchSettings& settings, std::uint64_t stream)
+      : normal_(scan, null, settings, stream), alpha_(settings.alpha) {
     if (sizes.empty()) return;
-    constexpr std::uint64_t kOther = 500000;
     null.sizes = std::move(sizes);
-    by_size_.emplace(scan, std::move(null), settings, salt + kOther);
+    by_size_.emplace(scan, std::move(null), settings, stream + kDrawsWithoutNormality);
   }
 
   double p(double evidence) {

@@ -4,6 +4,7 @@
 
 #include "analysis/residual/scatter/condition_scatter.h"
 #include "analysis/residual/search/attribution.h"
+#include "analysis/residual/search/draws.h"
 
 #include <map>
 #include <memory>
@@ -136,9 +137,10 @@ class Search {
   /// p of a likelihood ratio of one parameter of a fitted model: few rows are no large sample.
   double ratio_p(double ratio, const JointFit& fit) const;
   void read_back_terms();
-  /// With a new effect in, an older one may be explained better by another: it gives way; to nothing, where
-  /// neither is beyond chance any more.
-  void swap_weaker();
+  /// With a new effect in, an older one may be explained better by another, or not be beyond chance any more.
+  void ask_older_again();
+  /// Whether accepted effect t gave way: to another, or to nothing where neither is beyond chance.
+  bool gives_way(std::size_t t);
   /// Or by another form of itself, which was chosen while the newer was not known: the likelier, where each
   /// parameter that a form has more must be worth a ratio test.
   bool change_a_form();
@@ -161,8 +163,9 @@ class Search {
   bool is_found_without(const std::vector<Eigen::Index>& places, const JointFit& fit,
                         const Candidate& candidate, const CandidateFit& found) const;
   /// What chance makes of a scan on top of a fit, whose best candidate counts as no scatter. Refers to
-  /// `scan`.
-  NullMaxima maxima_of(const JointFit& fit, const Scan& scan, std::uint64_t salt) const;
+  /// `scan` and `settings`.
+  NullMaxima maxima_of(const JointFit& fit, const Scan& scan, Draws what);
+  NullMaxima maxima_of(const JointFit& fit, const Scan& scan, Draws what, const SearchSettings& settings);
 
   // what runs scatter like: search_scatter.cpp
   /// Whether runs, rotors or locations scatter unlike each other, or neighbouring runs resemble each other,
@@ -223,8 +226,8 @@ class Search {
   /// Whether a curve does nearly all that an effect's conditions do, so that a name beside it means nothing.
   bool is_work_of_a_curve(const Term& term, const Eigen::MatrixXd& made,
                           const Eigen::MatrixXd& predicted) const;
-  /// Of which rotor; −1: of what several do; nothing where it is not.
-  std::optional<int> session_scatter_is_large() const;
+  /// Nothing where it is not.
+  std::optional<SessionScatter> session_scatter_is_large() const;
 
   // what cannot be told apart: search_rivals.cpp
   void find_confounded();
@@ -261,7 +264,7 @@ class Search {
   JointFit fit_;
   Attribution result_;
   double critical_ = 0;
-  std::uint64_t salt_ = 0;
+  std::uint64_t questions_ = 0;  // that data sets were drawn for
 };
 
 }  // namespace tunnelrig

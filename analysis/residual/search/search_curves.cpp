@@ -66,7 +66,7 @@ bool Search::add_best_curve(const CurveScan& curves) {
   const auto& [scan, tried] = curves;
   if (tried.empty()) return false;
   const std::size_t best = scan.order[0];
-  NullMaxima maxima = maxima_of(fit_, scan, 1000 + ++salt_);
+  NullMaxima maxima = maxima_of(fit_, scan, Draws::kCurves);
   const double p = maxima.p(scan.fits[best].evidence);
   Round round;
   round.observed = scan.fits[best].evidence;
@@ -128,9 +128,9 @@ void Search::smooth_curves(std::size_t first) {
     const auto fits =
         CandidateScan(*mixed_, without.linear.columns, candidates).fit(difference(y_, without.linear.offset));
     const double n = places_on_range(*observations_.find(forms[0].covariate), rows_, forms[0].rotor);
-    const auto criterion = [&](std::size_t i) {  // Hurvich & Tsai 1989
-      const auto k = static_cast<double>(i + 1);
-      return 2 * k * n / std::max(n - k - 2, 1.0) - 2 * fits[i].likelihood_ratio;
+    const auto criterion = [&](std::size_t i) {   // Hurvich & Tsai 1989
+      const auto k = static_cast<double>(i + 2);  // columns and a constant
+      return 2 * (k + 1) * n / std::max(n - k - 2, 1.0) - 2 * fits[i].likelihood_ratio;
     };
     std::size_t best = 0;
     for (std::size_t i = 1; i < forms.size(); ++i)
@@ -161,7 +161,7 @@ void Search::drop_what_a_curve_replaces() {
 bool Search::is_still_found(const Term& term, const JointFit& without) {
   const Scan scan = scan_effects(without);
   if (scan.order.empty()) return false;
-  return maxima_of(without, scan, 4000 + ++salt_).p(evidence_of(scan, term)) <= settings_.alpha;
+  return maxima_of(without, scan, Draws::kStillFound).p(evidence_of(scan, term)) <= settings_.alpha;
 }
 
 void Search::forget_what_has_a_name() {
@@ -267,8 +267,11 @@ bool Search::bends_away(std::size_t t) {
   if (bends.tried.empty()) return false;
   rank(fit_, bends.scan);
   const std::size_t best = bends.scan.order[0];
-  const double p = maxima_of(fit_, bends.scan, 5000 + ++salt_).p(bends.scan.fits[best].evidence);
-  if (p > settings_.alpha / 2) return false;  // one question of each name, not the largest of many
+  const double p_allowed = settings_.alpha / 2;  // one question of each name, not the largest of many
+  SearchSettings enough = settings_;             // data sets for such a p
+  enough.simulations = std::max(enough.simulations, static_cast<std::size_t>(std::ceil(1 / p_allowed)));
+  const double p = maxima_of(fit_, bends.scan, Draws::kBends, enough).p(bends.scan.fits[best].evidence);
+  if (p > p_allowed) return false;
   const JointFit without = fit_;
   add_curve(bends.tried[best], p);
   const bool bent = outshone_by_curve(result_.accepted[t].term);
@@ -278,9 +281,10 @@ bool Search::bends_away(std::size_t t) {
   return bent;
 }
 
-std::optional<int> Search::session_scatter_is_large() const {
+std::optional<SessionScatter> Search::session_scatter_is_large() const {
+  constexpr double kOneSided = 0.025;  // a lower bound of 95 %
   const RotorSessions& unlike = observations_.scatter.sessions;
-  std::optional<int> rotor;
+  std::optional<SessionScatter> of_rotor;
   for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
     if (!mixed_->strata()[s].means()) continue;
     double below = 0;
@@ -288,13 +292,13 @@ std::optional<int> Search::session_scatter_is_large() const {
       if (kRatios[r] <= settings_.session_ratio * settings_.session_ratio)
         below += fit_.variances.ratio_probability[s][r];
     }
-    if (below >= 0.025) continue;
+    if (below >= kOneSided) continue;
     const Index mode = mixed_->strata()[s].first_mode;  // the first is what all have in common
     const bool own = unlike.rotors.size() == 1 && mode > 0 && mode < unlike.alone;
-    if (!own) return -1;
-    rotor = unlike.rotors[0];
+    if (!own) return SessionScatter{-1, below};
+    of_rotor = SessionScatter{unlike.rotors[0], below};
   }
-  return rotor;
+  return of_rotor;
 }
 
 }  // namespace tunnelrig

@@ -49,7 +49,7 @@ void Search::add_effects() {
   bool wider = true;
   while (wider) {
     while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect()) {
-      swap_weaker();
+      ask_older_again();
       while (change_a_form()) {
       }
     }
@@ -142,7 +142,7 @@ bool Search::add_best_effect() {
   const Scan scan = scan_effects_and_groups(fit_);
   Round round;
   if (scan.order.empty()) return false;
-  NullMaxima maxima = maxima_of(fit_, scan, ++salt_);
+  NullMaxima maxima = maxima_of(fit_, scan, Draws::kEffects);
   const double p = maxima.p(scan.fits[scan.order[0]].evidence);
   if (p <= settings_.alpha || critical_ == 0) critical_ = maxima.critical();
   round.observed = scan.fits[scan.order[0]].evidence;
@@ -157,10 +157,15 @@ bool Search::add_best_effect() {
   return added;
 }
 
-NullMaxima Search::maxima_of(const JointFit& fit, const Scan& scan, std::uint64_t salt) const {
+NullMaxima Search::maxima_of(const JointFit& fit, const Scan& scan, Draws what) {
+  return maxima_of(fit, scan, what, settings_);
+}
+
+NullMaxima Search::maxima_of(const JointFit& fit, const Scan& scan, Draws what,
+                             const SearchSettings& settings) {
   const std::size_t best = scan.order[0];
-  return {*scan.scan, fit.variances, sizes_beside(fit, scan.candidates[best], scan.fits[best]), settings_,
-          salt};
+  return {*scan.scan, fit.variances, sizes_beside(fit, scan.candidates[best], scan.fits[best]), settings,
+          static_cast<std::uint64_t>(what) + ++questions_};
 }
 
 std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const {
@@ -344,20 +349,21 @@ void Search::set_detectable(const Scan& scan) {
 }
 
 double Search::rms_of(const Eigen::MatrixXd& column) const {
-  Stacked stacked(0, 0);
-  double squares = 0;
+  constexpr double kRounding = 1e-14;  // of the squares, as MixedModel::sees
+  Components components(1 + observations_.shape.size(),
+                        Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
+  components[0] = column;
+  double whole = 0, squares = 0;
   Index count = 0;
   for (std::size_t s = 0; s < baseline_->strata().size(); ++s) {
     if (!baseline_->strata()[s].means()) continue;
-    Components components(1 + observations_.shape.size(),
-                          Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
-    components[0] = column;
-    stacked = baseline_->stack(s, {&components});
+    Stacked stacked = baseline_->stack(s, {&components});
+    whole += stacked.squaredNorm();
     baseline_->project(s, 0, stacked);
     squares += stacked.squaredNorm();
     count += stacked.size();
   }
-  return std::sqrt(squares / static_cast<double>(count));
+  return squares > kRounding * whole ? std::sqrt(squares / static_cast<double>(count)) : 0;
 }
 
 }  // namespace tunnelrig

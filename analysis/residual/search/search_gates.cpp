@@ -28,7 +28,7 @@ std::optional<std::string> Search::only_bends(const Term& term, const NullFit& v
                                               const CrossValidation& with_term) const {
   // A law that the baseline has, of a condition that is no load of a cell, may bend as well as the cell.
   const bool of_law =
-      term.effect->of_force_alone() && !observations_.baseline_over.empty() && !observations_.is_line();
+      term.effect->of_force_alone() && !observations_.baseline_over.empty() && !observations_.line_of_cell;
   for (const Curve& curve : curves_) {
     const auto shares = [&](const Accepted& other) {
       return is_over(curve, own_conditions(*other.term.effect, observations_)) &&

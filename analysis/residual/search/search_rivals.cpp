@@ -117,7 +117,7 @@ void Search::name_newest_curve(const JointFit& without) {
   result_.curves.pop_back();
   const JointFit with_curve = std::exchange(fit_, without);
   const Scan scan = scan_effects(fit_);
-  const double critical = scan.order.empty() ? 0 : maxima_of(fit_, scan, 6000 + ++salt_).critical();
+  const double critical = scan.order.empty() ? 0 : maxima_of(fit_, scan, Draws::kRivals).critical();
   const CrossValidation of_curve = unseen(with_curve, with_curve.variances);
   const auto left_of_curve = [&](const JointFit& beside) {
     const CandidateScan alone(*mixed_, beside.linear.columns, {as_candidate(newest.curve)});

@@ -117,12 +117,15 @@ std::vector<Curve> Search::of_each_rotor(const CurveScan& curves) {
 bool Search::begin_with_scatter_of(const CurveScan& curves) {
   const RunScatter& before = observations_.scatter;
   const bool known = before.rotors_differ();
-  std::mt19937_64 random(settings_.seed * 1000003 + 3000), other(settings_.seed * 1000003 + 4000),
-      third(settings_.seed * 1000003 + 5000), fourth(settings_.seed * 1000003 + 6000),
-      fifth(settings_.seed * 1000003 + 7000);
+  const auto draw = [&](Draws what) {
+    return random_numbers(settings_.seed, static_cast<std::uint64_t>(what));
+  };
+  std::mt19937_64 for_correlation = draw(Draws::kCorrelation), for_rotors = draw(Draws::kRotors),
+                  for_runs = draw(Draws::kRuns), for_sessions = draw(Draws::kSessions),
+                  for_contrasts = draw(Draws::kContrasts);
   // While a rotor that scatters more was taken for one like the others, the best curve had a part of its
   // scatter.
-  const ScatterBeside beside = scatter_beside(curves, known ? critical_ : 0, third);
+  const ScatterBeside beside = scatter_beside(curves, known ? critical_ : 0, for_runs);
   const std::vector<Components>& columns = beside.columns;
   const Components y = difference(y_, fit_.linear.offset);
   Observations scattered = observations_;
@@ -137,15 +140,15 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
     with_each_rotor.insert(with_each_rotor.end(), curve.columns.begin(), curve.columns.end());
   const Components of_rotors = left_beside(with_each_rotor);
   // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter.
-  const Eigen::VectorXd contrasts = contrast_scatter(scattered, rows_, of_rotors, fifth);
-  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, rows_, of_rotors, other);
+  const Eigen::VectorXd contrasts = contrast_scatter(scattered, rows_, of_rotors, for_contrasts);
+  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, rows_, of_rotors, for_rotors);
   const MixedModel model(scattered, rows_);
   const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);
-  scatter.run_correlation = run_correlation(model, variances, residual, random);
-  scatter.runs = run_scatter(observations_, run_sizes(model, variances, y, columns, third));
+  scatter.run_correlation = run_correlation(model, variances, residual, for_correlation);
+  scatter.runs = run_scatter(observations_, run_sizes(model, variances, y, columns, for_runs));
   // The best of many curves makes half of what a dozen sessions differ by, whatever that is.
   if (contrasts.size() == 0)
-    scatter.sessions = rotor_sessions(scattered, rows_, left_beside(fit_.linear.columns), fourth);
+    scatter.sessions = rotor_sessions(scattered, rows_, left_beside(fit_.linear.columns), for_sessions);
   scatter.contrasts = contrasts;  // after what takes the differences for one stratum
   if (are_alike(scatter.rotors, before.rotors) && are_alike(contrasts, before.contrasts) &&
       scatter.sessions.rotors == before.sessions.rotors &&

@@ -114,7 +114,7 @@ bool Search::accept_together(const Scan& scan, std::size_t i, double p) {
   fit_ = pair ? at_best_run(at_best_run(std::move(all), 1), 2) : std::move(all);
   const auto newest = fit_.model.terms.end() - static_cast<std::ptrdiff_t>(terms.size());
   for (auto term = newest; term != fit_.model.terms.end(); ++term)
-    result_.accepted.push_back({.term = *term, .p = p, .confounded = {}});
+    result_.accepted.push_back({.term = *term, .p = p, .together = true, .confounded = {}});
   read_back_terms();
   return true;
 }

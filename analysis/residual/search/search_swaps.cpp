@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <utility>
 
 namespace tunnelrig {
@@ -27,25 +28,37 @@ double worth(const JointFit& fit) {
 
 }  // namespace
 
-void Search::swap_weaker() {
-  for (std::size_t t = 0; t + 1 < result_.accepted.size(); ++t) {
-    const Term old = result_.accepted[t].term;
-    if (old.per_group || old.effect->theory_only) continue;  // as for a curve (drop_what_a_curve_replaces)
-    const JointFit without = fit_without(t);
-    const Scan scan = scan_effects(without);
-    if (scan.order.empty()) continue;
-    const std::size_t best = scan.order[0];
-    if (scan.ways[best].same_way(old) || !(scan.fits[best].evidence > evidence_of(scan, old) + kSwapDecades))
-      continue;
-    const JointFit tried = fit_with(without, scan.ways[best], scan.fits[best].amplitude(0));
-    if (!(tried.variances.log_likelihood > fit_.variances.log_likelihood) || !tried.at_bound.empty())
-      continue;
-    NullMaxima maxima = maxima_of(without, scan, ++salt_);
-    if (const double p = maxima.p(scan.fits[best].evidence); p <= settings_.alpha)
-      put_in_place(t--, tried, p);
-    else
-      drop(t--, without);  // with the newest in, neither is beyond chance
+void Search::ask_older_again() {
+  for (std::size_t t = 0; t + 1 < result_.accepted.size();)
+    if (!gives_way(t)) ++t;
+}
+
+bool Search::gives_way(std::size_t t) {
+  const Accepted& old = result_.accepted[t];
+  if (old.term.per_group || old.term.effect->theory_only)
+    return false;  // as for a curve (drop_what_a_curve_replaces)
+  const JointFit without = fit_without(t);
+  const Scan scan = scan_effects(without);
+  if (scan.order.empty()) return false;
+  const std::size_t best = scan.order[0];
+  const double own = evidence_of(scan, old.term);
+  std::optional<JointFit> better;
+  if (!scan.ways[best].same_way(old.term) && scan.fits[best].evidence > own + kSwapDecades) {
+    better = fit_with(without, scan.ways[best], scan.fits[best].amplitude(0));
+    if (!(better->variances.log_likelihood > fit_.variances.log_likelihood) || !better->at_bound.empty())
+      better.reset();
   }
+  // What was taken for one of several is settled by what they do together.
+  if (!better && (old.together || own >= critical_)) return false;
+  NullMaxima maxima = maxima_of(without, scan, Draws::kEffects);
+  const double p = maxima.p(better ? scan.fits[best].evidence : own);
+  if (p > settings_.alpha)
+    drop(t, without);  // with the newest in, neither is beyond chance
+  else if (better)
+    put_in_place(t, *better, p);
+  else
+    return false;
+  return true;
 }
 
 bool Search::change_a_form() {
@@ -61,7 +74,9 @@ bool Search::change_a_form() {
     for (const auto& [form, i] : best) {
       const JointFit tried = fit_with(without, scan.ways[i], scan.fits[i].amplitude(0));
       if (!(worth(tried) > worth(fit_)) || !tried.at_bound.empty()) continue;
-      put_in_place(t, tried, maxima_of(without, scan, ++salt_).p(scan.fits[i].evidence));
+      const double p = maxima_of(without, scan, Draws::kEffects).p(scan.fits[i].evidence);
+      if (p > settings_.alpha) continue;
+      put_in_place(t, tried, p);
       return true;
     }
   }

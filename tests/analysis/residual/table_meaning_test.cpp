@@ -68,7 +68,7 @@ TEST_F(TablesTest, AStraightBaselineIsACellsLineWhereACellIsLoaded) {
                                 "[[covariates]]\ncolumn = \"x\"\nunit = \"{}\"\n",
                                 of_y, of_x),
                     "linear:x")
-        .is_line();
+        .line_of_cell;
   };
   for (const char* of_y : {"1", "mV/V", "counts", "N"}) EXPECT_TRUE(is_line("N", of_y)) << of_y;
   EXPECT_TRUE(is_line("Pa", "V"));
