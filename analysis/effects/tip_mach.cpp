@@ -32,8 +32,8 @@ std::vector<Effect> tip_mach() {
       .name = "tip_mach",
       .form = "",
       .formula = "F ((1 − M²) / (1 − M0²))^(−m), M = Ω R / a(Θ)",
-      .physics = "Prandtl–Glauert: the lift slope goes with (1 − M²)^(−1/2); m is the share of the blade "
-                 "that sees it",
+      .physics = "Prandtl–Glauert: the lift slope goes with (1 − M²)^(−1/2); m would be 1/2 if the whole "
+                 "blade saw the tip's Mach number",
       .parameters = {{"exponent", "1", 0, 2}},
       .covariates = {"speed_rpm", "air_temperature_C"},
       .scope = EffectScope::kShared,

@@ -58,12 +58,13 @@ const utc = (seconds) => new Date(seconds * 1000).toISOString().slice(0, 16).rep
 
 /**
  * A table that scrolls within the page, under its title. Columns: {name, cell(row), text: set flush left}.
+ * `kind` 'whole': as high as its rows are.
  */
-function table(title, columns, rows) {
+function table(title, columns, rows, kind = '') {
   const side = (column) => (column.text ? {class: 'text'} : {});
   return h(
       'div', {class: 'table'}, h('p', {class: 'table-title'}, prose(title)),
-      h('div', {class: 'scroll', tabindex: '0', role: 'region', 'aria-label': title},
+      h('div', {class: `scroll ${kind}`, tabindex: '0', role: 'region', 'aria-label': title},
         h('table', {'aria-label': title},
           h('thead', {}, h('tr', {}, columns.map((c) => h('th', {scope: 'col', ...side(c)}, prose(c.name))))),
           h('tbody', {},
@@ -74,7 +75,7 @@ function table(title, columns, rows) {
 const code = (line) =>
     h('code', {}, line.split(' ').flatMap((word, i) => [i ? ' ' : '', h('span', {class: 'word'}, word)]));
 
-/** A word that stands for a verdict; kinds: ok, note, problem. */
+/** A word that stands for a verdict; kinds: ok, note, problem, neutral. */
 const badge = (kind, text) => h('span', {class: `badge ${kind}`}, text);
 
 /** "Numbers: tunnelrig reduce …": what makes the numbers again. */

@@ -5,7 +5,7 @@ const made = report.made.arguments;
 
 const verdictKinds = {
   explained: 'ok',
-  no_structure: 'ok',
+  no_structure: 'neutral',
   confounded: 'note',
   partly_explained: 'note'
 };
@@ -46,11 +46,11 @@ const untestableSection = () => table(
       {name: 'effect', cell: (u) => u.effect, text: true},
       {
         name: 'why',
-        cell: (u) => (u.missing.length && u.effect !== 'structure' ? `not recorded: ${u.missing.join(', ')}` : u.reason),
+        cell: (u) => h('span', {class: 'wrap'}, u.missing.length && u.effect !== 'structure' ? `not recorded: ${u.missing.join(', ')}` : u.reason),
         text: true
       },
     ],
-    explanation.untestable);
+    explanation.untestable, 'whole');
 
 const suspectSection = () =>
     [h('p', {},

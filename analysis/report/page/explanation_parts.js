@@ -10,6 +10,11 @@ function digits(value, n = 3) {
   return (value < 0 ? '−' : '') + text;
 }
 
+/** No p is below one over the simulated data sets and one: there it is a bound. The report knows no number of them. */
+const isLeastP = (p) => known(p) && p * (report.settings?.simulations + 1) < 1.001;
+const digitsOfP = (p) => (isLeastP(p) ? '≤ ' : '') + digits(p);
+const sayP = (p) => `p ${isLeastP(p) ? '≤' : '='} ${digits(p)}`;
+
 const bracket = ([low, high]) => `[${digits(low)}, ${digits(high)}]`;
 const unitSuffix = (unit) => (unit && unit !== '1' ? ` ${unit}` : '');
 const unitBracket = (unit) => (unit === '' ? '' : ` [${unit === '1' ? '–' : unit}]`);
@@ -17,8 +22,15 @@ const unitBracket = (unit) => (unit === '' ? '' : ` [${unit === '1' ? '–' : un
 const effectLabel = ({effect, form, rotor, from_rotor: from}) => effect + (form ? ` (${form})` : '') +
     (from ? ` from rotor ${from}` : '') + (rotor ? ` ${from ? 'to' : 'of'} rotor ${rotor}` : '');
 
-function drawErrors({before, after, noise_floor: floor, unit}) {
-  const names = ['noise floor', 'after', 'before'];
+/** What the error after counts: where there are curves without a name, whether they are in it. */
+const afterTitle = ({unknown, empirical = []}) => !unknown.length ? 'after' :
+    empirical.length                                              ? 'after, curves included' :
+                                                                    'after, named effects only';
+
+function drawErrors(explanation) {
+  const {before, after, noise_floor: floor, unit} = explanation;
+  const afterName = afterTitle(explanation);
+  const names = ['noise floor', afterName, 'before'];
   const colours = rotorColours();
   const dot = (y, error, colour, symbol) => ({
     type: 'scatter',
@@ -60,7 +72,7 @@ function drawErrors({before, after, noise_floor: floor, unit}) {
   const farthest = 4 * Math.max(before.held_out_rmse, after.held_out_rmse, floor);
   const end = Math.min(farthest, 1.05 * Math.max(before.held_out_ci95[1], after.held_out_ci95[1], floor));
   return {
-    data: [floorDot, dot('after', after, colours[0], 'circle'), dot('before', before, colours[1], 'square')],
+    data: [floorDot, dot(afterName, after, colours[0], 'circle'), dot('before', before, colours[1], 'square')],
     layout: {
       xaxis: axis(`root mean square error on blocks held out${unitBracket(unit)}`, {range: [0, end]}),
       yaxis: axis('', {type: 'category', categoryarray: names, categoryorder: 'array', range: [-0.5, 2.5]}),
@@ -75,7 +87,7 @@ function errorFigure(explanation, made) {
   const value = (error) =>
       `${digits(error.held_out_rmse, 4)} ${bracket(error.held_out_ci95)}${unitSuffix(unit)}`;
   const caption = sentences(
-      `Error on blocks held out: before ${value(before)}, after ${value(after)}; bars are 95 % intervals,`,
+      `Error on blocks held out: before ${value(before)}; ${afterTitle(explanation)}, ${value(after)}; bars are 95 % intervals,`,
       'by resampling the blocks. The noise floor,',
       `${digits(floor, 4)}${unitSuffix(unit)}, is the error to expect of an exact model: scatter of runs`,
       'and sessions, and the uncertainty of its coefficients.',
@@ -98,7 +110,7 @@ const parameterTable = (adopted, unit) => {
         {name: 'value', cell: (r) => digits(r.value, 4) + (r.theory ? ' (theory)' : '')},
         {name: '95 % interval', cell: (r) => bracket(r.ci95)},
         {name: 'unit', cell: (r) => (r.unit === '1' ? '–' : r.unit), text: true},
-        {name: 'p of the effect', cell: (r) => digits(r.effect.p_value)},
+        {name: 'p of the effect', cell: (r) => digitsOfP(r.effect.p_value)},
         {name: `gain${unitBracket(unit)}`, cell: (r) => digits(r.effect.held_out_gain)},
       ],
       rows);
@@ -115,10 +127,11 @@ function confusionText({confounded_with: rivals, separating_run: run}) {
 
 const nameOfText = (label) => label || '(empty)';
 
-/** What each text makes, against the mean of all. */
+/** What each text makes, against the mean of all, with half of its 95 % interval. */
 const labelsText = ({shape, labels = []}, unit) => labels.length === 0 ?
     '' :
-    ` ${shape.map(([x, y]) => `${nameOfText(labels[x - 1])} ${digits(y)}`).join(', ')}${unitSuffix(unit)}.`;
+    ` ${shape.map(([x, y, low, high]) => `${nameOfText(labels[x - 1])} ${digits(y)} ± ${digits((high - low) / 2, 2)}`)
+            .join(', ')}${unitSuffix(unit)}, with 95 % intervals.`;
 
 /** What a slope that goes with the place does where. */
 const placeText = (place) => place === 'tunnel' ? ' in the tunnel, compared with open space' :
@@ -146,6 +159,6 @@ const unknownText = (unknown, unit) => {
   const twins = unknown.collinear_with?.length ? ` Not to be told from ${unknown.collinear_with.join(', ')}.` : '';
   const where = `${rotor ? ` at rotor ${rotor}` : ''}${placeText(place)}${timesText(times)}`;
   return `Depends on \`${covariate}\`${where}: amplitude ${digits(amplitude)}${
-      unitSuffix(unit)}, p = ${digits(p)}. A shape, not a cause.${twins}${bySealed}${names}${labelsText(unknown, unit)}${
+      unitSuffix(unit)}, ${sayP(p)}. A shape, not a cause.${twins}${bySealed}${names}${labelsText(unknown, unit)}${
       insteadOf.length ? ` It bends away from the formula of ${insteadOf.join(', ')}.` : ''}`;
 };

@@ -1,5 +1,7 @@
 // How candidates ranked, and what the largest evidence is where there is no effect.
 
+const kBars = 15;
+
 const verticalLine = (x, colour, dash) =>
     ({type: 'line', yref: 'paper', y0: 0, y1: 1, x0: x, x1: x, line: {color: colour, width: 2, dash}});
 const note = (x, y, text, colour, anchor = 'left') => ({
@@ -14,10 +16,26 @@ const note = (x, y, text, colour, anchor = 'left') => ({
   bgcolor: style('--page')
 });
 
+const kLetters = 30;  // of a line beside a bar
+
+/** A label in one line or two, broken between words where it can be. */
+function inLines(label) {
+  const cut = (line) => (line.length > kLetters ? `${line.slice(0, kLetters - 1)}…` : line);
+  if (label.length <= kLetters) return [label];
+  const space = label.lastIndexOf(' ', kLetters);
+  return (space > 0 ? [label.slice(0, space), label.slice(space + 1)] : [label]).map(cut);
+}
+
+/** Room for every bar's label. */
+const rankingHeight = ({ranking}) => {
+  const best = ranking.slice(0, kBars);
+  return 90 + (best.some((r) => inLines(r.label).length > 1) ? 31 : 24) * best.length;
+};
+
 function drawRanking({ranking, critical}) {
-  const best = ranking.slice(0, 15).reverse();
+  const best = ranking.slice(0, kBars).reverse();
   const [blue] = rotorColours();
-  const names = best.map((r) => plain(r.label.length > 30 ? `${r.label.slice(0, 29)}…` : r.label));
+  const names = best.map((r) => inLines(r.label).map(plain).join('<br>'));
   return {
     data: [{
       type: 'bar',
@@ -25,7 +43,7 @@ function drawRanking({ranking, critical}) {
       x: best.map((r) => Math.max(0, r.evidence)),
       y: best.map((_, i) => i),
       marker: {color: best.map((r) => (r.evidence >= critical ? blue : style('--soft')))},
-      text: best.map((r) => `${plain(r.label)}<br>evidence ${digits(r.evidence)}, p = ${digits(r.p)}`),
+      text: best.map((r) => `${plain(r.label)}<br>evidence ${digits(r.evidence)}, ${sayP(r.p)}`),
       textposition: 'none',
       hovertemplate: '%{text}<extra></extra>'
     }],
@@ -70,7 +88,7 @@ const rankingTable = (ranking) => table(
     [
       {name: 'candidate', cell: (r) => r.label, text: true},
       {name: 'evidence', cell: (r) => digits(r.evidence)},
-      {name: 'p of the maximum', cell: (r) => digits(r.p)},
+      {name: 'p of the maximum', cell: (r) => digitsOfP(r.p)},
       {name: 'parameter', cell: (r) => r.parameter, text: true},
       {name: 'value', cell: (r) => digits(r.amplitude)},
       {name: 'standard error', cell: (r) => (r.standard_error > 0 ? digits(r.standard_error) : '–')},
@@ -81,7 +99,7 @@ const rankingTable = (ranking) => table(
 function roundFigure(round, i, made) {
   const outcome = round.outcome.replace(/; $/, '');
   const caption = sentences(
-      'Left: each candidate’s evidence in its best way, −log10 of its own p with its prior weight; dashed: what α asks for. Right: the largest evidence of all',
+      'Bars: each candidate’s evidence in its best way, −log10 of its own p with its prior weight; dashed: what α asks for. Histogram: the largest evidence of all',
       `candidates together in ${
           counted(round.null_maxima.length, 'campaign')} simulated without effect, on this`,
       'campaign’s own design; the share beyond the observed one is its p.');
@@ -90,7 +108,7 @@ function roundFigure(round, i, made) {
         h('div', {},
           plot(
               `Evidence of the candidates in round ${i + 1}`,
-              () => 90 + 24 * Math.min(15, round.ranking.length), () => drawRanking(round))),
+              () => rankingHeight(round), () => drawRanking(round))),
         h('div', {}, plot(`Null distribution of round ${i + 1}`, () => 360, () => drawNull(round))));
   return [
     figure(`Round ${i + 1}: ${outcome}`, [], panels, caption, made),

@@ -98,6 +98,7 @@ function drawPanel(panel, which, reach) {
       name: 'runs',
       x: panel.x,
       y: panel[which],
+      cliponaxis: false,
       text: panel.run.map((run, i) => runText(run, panel.channel[i])),
       marker: {color: style('--soft'), size: 4, opacity: 0.45},
       hovertemplate: '%{text}<br>%{x}: %{y:.4g}<extra></extra>'
@@ -154,6 +155,12 @@ function reachOf(values) {
   return 1.15 * sizes[Math.min(sizes.length - 1, Math.floor(0.995 * sizes.length))] || 1;
 }
 
+/** How many of the points drawn lie beyond what their axis shows. */
+function outsideText(values, reach) {
+  const outside = values.filter((v) => known(v) && Math.abs(v) > reach).length;
+  return outside ? `Outside the picture: ${counted(outside, 'point')} (double-click to see all).` : '';
+}
+
 function panelFigure(panel, made) {
   const reach = reachOf([...panel.before, ...panel.after]);
   const one = (which, title) => h(
@@ -167,7 +174,7 @@ function panelFigure(panel, made) {
           `Grey: every run, ${of}; blue: means of runs of like ${panel.covariate} with 95 % intervals`,
           'from the runs’ scatter; orange: what the fitted model makes of it for the same runs, without what the baseline’s',
           `own coefficients absorb${panel.half ? ', with its 95 % band' : ''}.`,
-          'Left: everything else that was found is taken out. Right: this too.',
+          'Before: everything else that was found is taken out. After: this too.', outsideText([...panel.before, ...panel.after], reach),
           panel.place ?
               `Only runs where ${panel.place} is 0.5 or more; below −0.5 too, with the sign of what was measured turned round.` :
               '',
@@ -175,7 +182,7 @@ function panelFigure(panel, made) {
               `Only that half of the runs where ${panel.times} is farther from its mean; below the mean with the sign of what was measured turned round.` :
               '');
   const plots = session ? one('after', 'sessions') :
-                          h('div', {class: 'pair'}, one('before', 'before'), one('after', 'after'));
+                          h('div', {class: 'pair'}, one('before', 'before: all else taken out'), one('after', 'after: this taken out too'));
   return figure(`${panel.label}, against ${panel.covariate}`, [], plots, caption, made);
 }
 
@@ -189,6 +196,7 @@ function drawOrder(which, reach) {
                         name: runs[which].length > 1 ? `rotor ${c + 1}` : 'residual',
                         x: values.map((_, i) => i + 1),
                         y: values,
+                        cliponaxis: false,
                         text: values.map((_, i) => runText(i, c + 1)),
                         marker: {color: colours[c % 4], symbol: symbols[c % 4], size: 4, opacity: 0.7},
                         hovertemplate: '%{text}<br>%{y:.4g}<extra></extra>'
@@ -218,16 +226,20 @@ function drawOrder(which, reach) {
 
 function orderFigure(made) {
   const {runs} = report;
-  const reach = reachOf([...runs.before, ...runs.after].flat().filter(known));
-  const one = (which) =>
-      h('div', {}, h('h4', {}, which),
+  const values = [...runs.before, ...runs.after].flat().filter(known);
+  const reach = reachOf(values);
+  const curves = report.explanation.unknown.some((u) => u.covariate !== 'session' && !u.by_sealed_too);
+  const one = (which, title) =>
+      h('div', {}, h('h4', {}, title),
         plot(`Residuals in order of time, ${which}`, () => 320, () => drawOrder(which, reach)));
   const caption = sentences(
       'Residuals of all runs as the whole model is fitted to all of them, before with the baseline alone.',
-      'Vertical lines: a new block begins.');
+      'Vertical lines: a new block begins.', outsideText(values, reach));
   return figure(
-      'Residuals in order of time', [], h('div', {class: 'pair'}, one('before'), one('after')), caption,
-      made);
+      'Residuals in order of time', [],
+      h('div', {class: 'pair'}, one('before', 'before: the baseline alone'),
+        one('after', curves ? 'after: names and curves taken out' : 'after')),
+      caption, made);
 }
 
 function drawCourse(course, which, reach) {
@@ -243,7 +255,7 @@ function drawCourse(course, which, reach) {
     data,
     layout: {
       xaxis: axis('time since the run’s first frame [s]'),
-      yaxis: axis('reading over the run’s mean [%]', {range: [-reach, reach]}),
+      yaxis: axis('reading − mean [% of mean]', {range: [-reach, reach]}),
       showlegend: true,
       legend: {orientation: 'h', y: 1.02, yanchor: 'bottom'}
     }
@@ -253,10 +265,11 @@ function drawCourse(course, which, reach) {
 function courseFigure(course, made) {
   const reach =
       reachOf(course.measured.flatMap((v, i) => [v - course.half[i], v + course.half[i], course.model[i]]));
-  const one = (which) =>
-      h('div', {}, h('h4', {}, which),
+  const one = (which, title) =>
+      h('div', {}, h('h4', {}, title),
         plot(`Course within the run, ${which}`, () => 300, () => drawCourse(course, which, reach)));
   return figure(
-      `${course.label}, within the runs`, [], h('div', {class: 'pair'}, one('before'), one('after')),
+      `${course.label}, within the runs`, [],
+      h('div', {class: 'pair'}, one('before', 'before: as measured'), one('after', 'after: named effects taken out')),
       'Mean course of the runs’ windows with its 95 % band, as its first six cosines give it.', made);
 }

@@ -51,16 +51,20 @@ function drawHealth() {
   const runLook = {name: 'thrust runs', marker: {color: runColour, size: 5}};
   const tareLook = {name: 'tares', marker: {color: tareColour, size: 6, symbol: 'triangle-up-open'}};
   const data = [];
-  const layout = {xaxis: timeAxis('start of the run (UTC)', {anchor: `y${checks.length}`})};
-  checks.forEach((check, k) => {
+  // Plotly makes no axis for a check without a value (no tachometer), and the last one carries the time's.
+  const shown = checks.filter(({value}) => indices.some((i) => known(value(report.runs, i))));
+  const layout = {xaxis: timeAxis('start of the run (UTC)', {anchor: shown.length > 1 ? `y${shown.length}` : 'y'})};
+  shown.forEach((check, k) => {
     const id = k === 0 ? '' : k + 1;  // Plotly's axes are yaxis, yaxis2, …
     const at = {yaxis: `y${id}`, showlegend: k === 0};
     data.push(checkTrace(check, runs, {...runLook, ...at}), checkTrace(check, tares, {...tareLook, ...at}));
-    const top = 1 - k / checks.length;
-    const domain = [top - 1 / checks.length + 0.03, top - 0.01];
+    const top = 1 - k / shown.length;
+    const domain = [top - 1 / shown.length + 0.03, top - 0.01];
     layout[`yaxis${id}`] = axis(check.title, {domain, rangemode: 'tozero'});
   });
-  layout.shapes = [-kDriftLimit, kDriftLimit].map((limit) => rule(limit, style('--bad'), {yref: 'y'}));
+  layout.shapes = shown[0] === checks[0] ?
+      [-kDriftLimit, kDriftLimit].map((limit) => rule(limit, style('--bad'), {yref: 'y'})) :
+      [];
   layout.legend = {orientation: 'h', y: 1.01, yanchor: 'bottom'};
   layout.margin = kTimeMargin;
   return {data, layout};
@@ -74,7 +78,7 @@ function healthSection() {
       `channel where it is most (beyond the dotted lines at ±${kDriftLimit} it is no longer noise:`,
       `${moving}); samples at the end of the converter’s range; frames lost on the way; and the`,
       'shaft’s line in the spectrum, a second tachometer, against the one that was read. A mean is',
-      'worth its error bar only where the first three are quiet.');
+      'worth its error bar only where the first three are quiet. What is known of no run is not drawn.');
   return figure('Every run over the days', [], place, caption, command('doctor'));
 }
 

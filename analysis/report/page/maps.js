@@ -159,6 +159,29 @@ function crosses(maps, field) {
   ];
 }
 
+/** Moves numbers of contour lines from under the crosses: up or down, until they clear them. */
+function clearCrosses(place) {
+  const boxOf = (element) => element.getBoundingClientRect();
+  const marks = [...place.querySelectorAll('.scatterlayer .point')].map(boxOf);
+  for (const text of place.querySelectorAll('.contourlabels text:not([data-moved])')) {
+    const box = boxOf(text);
+    const mark = marks.find(
+        (m) => m.left < box.right && m.right > box.left && m.top < box.bottom && m.bottom > box.top);
+    if (!mark) continue;
+    const upwards = box.top + box.bottom <= mark.top + mark.bottom;
+    const shift = upwards ? mark.top - box.bottom : mark.bottom - box.top;
+    text.setAttribute('transform', `translate(0 ${shift}) ${text.getAttribute('transform') ?? ''}`);
+    text.dataset.moved = '';
+  }
+}
+
+function afterMap(place) {
+  clearCrosses(place);
+  if (place.dataset.clears !== undefined) return;
+  place.dataset.clears = '';
+  place.on('plotly_afterplot', () => clearCrosses(place));  // a zoom places the numbers anew
+}
+
 function drawMap(maps, field, layerName, width) {
   const layer = layerOf(maps, field, layerName);
   const last = maps.y_norm.length, middle = (last - 1) / 2;
@@ -176,6 +199,7 @@ function drawMap(maps, field, layerName, width) {
       yaxis: axis(heightTitle, {...side, scaleanchor: 'x'}),
       margin: {...mapMargin(isNarrow(width)), autoexpand: false},
     },
+    afterwards: afterMap,
   };
 }
 

@@ -27,8 +27,8 @@ const config = {
 };
 
 /**
- * A place for a plot. `build(width)` gives {data, layout}, anew for every width and theme; `height(width)` is
- * in pixels. `label` says what it shows to those who cannot see it.
+ * A place for a plot. `build(width)` gives {data, layout}, anew for every width and theme, and `afterwards(place)`
+ * where something is left to do once it is drawn; `height(width)` is in pixels. `label` says what it shows to those who cannot see it.
  */
 function plot(label, height, build) {
   const place = h('div', {class: 'plot', role: 'group', 'aria-label': label});
@@ -43,9 +43,10 @@ function reserve(plot) {
 async function draw(plot) {
   plot.begun = true;
   const width = plot.place.clientWidth;
-  const {data, layout} = plot.build(width);
+  const {data, layout, afterwards} = plot.build(width);
   await Plotly.react(
       plot.place, data, {...baseLayout(width), ...layout, width, height: plot.height(width)}, config);
+  afterwards?.(plot.place);
   plot.drawn = true;
   tell();
 }

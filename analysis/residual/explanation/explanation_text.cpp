@@ -14,13 +14,13 @@ std::string name_of_value(const UnknownStructure& unknown, double x) {
   return label.empty() ? "(empty)" : label;
 }
 
-/// What each text or, of few, each value makes: "A −0.012, B 0.012 N".
+/// What each text or, of few, each value makes: "A -0.012 ± 0.003, B +0.012 ± 0.003 N (± at 95 %)".
 std::string levels_in_words(const UnknownStructure& unknown, const std::string& unit) {
   std::string text;
   for (const ShapePoint& point : unknown.shape)
     text += fmt::format("{}{} {:+.3g} ± {:.2g}", text.empty() ? "" : ", ", name_of_value(unknown, point.x),
                         point.y, (point.high - point.low) / 2);
-  return text + unit;
+  return text + unit + " (± at 95 %)";
 }
 
 std::string place_in_words(const std::string& place) {
