@@ -150,23 +150,25 @@ bool baseline_does_better(const Explanation& explanation) {
          explanation.sealed.against_adopted;
 }
 
-/// Curves of single rotors over its own condition beside what it says of all, in words: it may be no more
-/// than what these leave of each other. The condition is found then, where the names alone make the error
-/// larger.
+/// A curve over its own condition beside it, in words, where the names alone make the error larger: of single
+/// rotors beside what it says of all, it may be no more than what these leave of each other; of the same
+/// rotors it is what the curve takes back.
 std::string contradiction(const AdoptedEffect& adopted, const Explanation& explanation,
                           const Observations& observations) {
-  if (adopted.term.rotor >= 0 || explanation.after.held_out_rmse <= explanation.before.held_out_rmse)
-    return "";
+  const double after = explanation.after.held_out_rmse, before = explanation.before.held_out_rmse;
+  if (after <= before) return "";
   const std::vector<std::string> own = own_conditions(*adopted.term.effect, observations);
-  const auto of_one = [&](const UnknownStructure& unknown) {
-    return unknown.rotor >= 0 && !unknown.by_sealed_too &&
-           std::ranges::find(own, unknown.condition) != own.end();
-  };
-  const auto curve = std::ranges::find_if(explanation.unknown, of_one);
-  if (curve == explanation.unknown.end()) return "";
-  return fmt::format(
-      "curves of single rotors over {} say otherwise, and without them it makes the error larger",
-      curve->condition);
+  for (const UnknownStructure& curve : explanation.unknown) {
+    if (curve.by_sealed_too || std::ranges::find(own, curve.condition) == own.end()) continue;
+    if (adopted.term.rotor < 0 && curve.rotor >= 0)
+      return fmt::format(
+          "curves of single rotors over {} say otherwise, and without them it makes the error larger",
+          curve.condition);
+    if (adopted.term.rotor == curve.rotor && is_worse(after, before))
+      return fmt::format("a curve over {} takes it back, and without that it makes the error larger",
+                         curve.condition);
+  }
+  return "";
 }
 
 Refuted refuted(const Explanation& explanation, const Observations& observations) {
@@ -191,6 +193,21 @@ Refuted refuted(const Explanation& explanation, const Observations& observations
   // is seen beside it: what has equals goes first, and the rest is judged beside the one that is left.
   const auto has_equals = [](const Against& refuted) { return !refuted.adopted->confounded_with.empty(); };
   if (std::ranges::any_of(against, has_equals)) std::erase_if(against, std::not_fn(has_equals));
+  // Two formulas of one condition, neither of which is known beside the other, make any shape over it: the
+  // newest is none, and the other is judged without it.
+  const auto of_one_condition = [&](const Against& a, const Against& b) {
+    const auto of_a = own_conditions(*a.adopted->term.effect, observations);
+    const auto of_b = own_conditions(*b.adopted->term.effect, observations);
+    return a.adopted->term.rotor == b.adopted->term.rotor &&
+           std::ranges::find_first_of(of_a, of_b) != of_a.end();
+  };
+  for (std::size_t k = against.size(); k-- > 1;)
+    if (std::any_of(against.begin(), against.begin() + static_cast<std::ptrdiff_t>(k),
+                    [&](const Against& older) { return of_one_condition(older, against[k]); })) {
+      against[k].never_stays = true;
+      against = {against[k]};
+      break;
+    }
   Refuted result;
   for (auto& [adopted, why, never_stays] : against) {
     result.terms.push_back(adopted->term);
