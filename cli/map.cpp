@@ -32,6 +32,10 @@ nlohmann::ordered_json fit_json(const FitSummary& fit) {
                               {"hyperparameters", fit.hyperparameters}};
   if (fit.leave_one_out.standardised_rms)
     json["leave_one_out_standardised"] = *fit.leave_one_out.standardised_rms;
+  if (fit.offset) {
+    json["offset_percent"] = fit.offset->value_percent;
+    json["offset_u95_percent"] = fit.offset->u95_percent;
+  }
   return json;
 }
 
@@ -48,6 +52,15 @@ int decimals_for(std::initializer_list<double> values, int least) {
 std::string rounded_text(double value, int decimals) {
   const double unit = std::pow(10, decimals);
   return fmt::format("{:.{}f}", std::round(value * unit) / unit + 0.0, decimals);
+}
+
+/// With its uncertainty, where that is known.
+std::string offset_text(const RigOffset& offset) {
+  const int decimals = decimals_for({offset.u95_percent}, 2);
+  const std::string value = rounded_text(offset.value_percent, decimals);
+  return std::isnan(offset.u95_percent)
+             ? fmt::format("{} %, of unknown uncertainty", value)
+             : fmt::format("{} ± {} %", value, rounded_text(offset.u95_percent, decimals));
 }
 
 void print(const WrittenMaps& written) {
@@ -69,7 +82,10 @@ void print(const WrittenMaps& written) {
   row("change of C_T against OT", written.map.delta_ct, written.map.delta_ct_fit);
   row("uneven thrust U", written.map.uneven_thrust, written.map.uneven_thrust_fit);
   table.print();
-  fmt::print("\n{} locations, {}; {} files in {}\n", written.map.locations.size(), written.map.method,
+  fmt::print("\n");
+  if (const auto& offset = written.map.uneven_thrust_fit.offset)
+    fmt::print("offset of the rig in U, taken out of the map: {}\n", offset_text(*offset));
+  fmt::print("{} locations, {}; {} files in {}\n", written.map.locations.size(), written.map.method,
              written.files.size(), written.files.empty() ? "" : written.files[0].parent_path().string());
 }
 
@@ -122,6 +138,12 @@ int run_map(const MapOptions& options) {
         "how far C_T and U scatter is not known (no location was repeated, and there are no raw data): {}",
         written.map.delta_ct.u95_known() ? "the maps' uncertainty is without it"
                                          : "nor is the maps' uncertainty, of which there is no picture"));
+  if (const auto& offset = written.map.uneven_thrust_fit.offset; offset && offset->significant())
+    warn(
+        fmt::format("U of {} is seen where symmetry demands 0, which is the rig's and not the tunnel's "
+                    "(check propellers.csv, "
+                    "arms, cells); it has been taken out of the map",
+                    offset_text(*offset)));
   if (written.warning) warn(*written.warning);
   if (options.json) {
     nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},

@@ -14,8 +14,27 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
+
 constexpr double kSamePosition = 1e-6;  // a micrometre in the 1.5 m tunnel
+
+/// C of C x = 0, a row for each estimate that is not the first at its position.
+MatrixXd differences(const Coincidence& positions) {
+  const auto n = static_cast<Index>(positions.first.size());
+  MatrixXd c = MatrixXd::Zero(n - static_cast<Index>(positions.kept.size()), n);
+  for (Index i = 0, row = 0; i < n; ++i) {
+    const Index first = positions.first[static_cast<std::size_t>(i)];
+    if (first == i) continue;
+    c(row, i) = 1;
+    c(row++, first) = -1;
+  }
+  return c;
 }
+
+MatrixXd pseudo_inverse(const MatrixXd& matrix) {
+  return matrix.completeOrthogonalDecomposition().pseudoInverse();
+}
+
+}  // namespace
 
 VectorXd values_of(const std::vector<LocationEstimate>& locations, double LocationEstimate::*value) {
   VectorXd values(static_cast<Index>(locations.size()));
@@ -59,30 +78,41 @@ Coincidence coincidence(const std::vector<TunnelPoint>& points) {
   return result;
 }
 
+Estimates combined(const Estimates& estimates, const MatrixXd& shares) {
+  const MatrixXd covariance = shares * estimates.covariance * shares.transpose();
+  return {shares * estimates.values, 0.5 * (covariance + covariance.transpose()),
+          transformed(estimates.over_root_dof, shares)};
+}
+
+MatrixXd merging_shares(const Estimates& estimates, const Coincidence& positions, const std::string& what) {
+  // With the constraints C x = 0: x̂ = (I − G C) x, G = Σ Cᵀ (C Σ Cᵀ)⁺, which is the generalised
+  // least-squares estimate and needs no inverse of Σ.
+  const VectorXd& x = estimates.values;
+  const MatrixXd c = differences(positions);
+  MatrixXd shares = MatrixXd::Identity(x.size(), x.size());
+  if (c.rows() == 0) return shares;
+  shares -=
+      estimates.covariance * c.transpose() * pseudo_inverse(c * estimates.covariance * c.transpose()) * c;
+  if ((c * shares * x).cwiseAbs().maxCoeff() > 1e-6 * x.cwiseAbs().maxCoeff()) throw InputError(what);
+  return shares(positions.kept, Eigen::all);
+}
+
 Estimates merge_coincident(const Estimates& estimates, const Coincidence& positions,
                            const std::string& what) {
-  // With the constraints C x = 0: x̂ = x − G C x and Σ̂ = Σ − G C Σ, G = Σ Cᵀ (C Σ Cᵀ)⁺, which is the
-  // generalised least-squares estimate and needs no inverse of Σ.
-  const VectorXd& x = estimates.values;
-  const MatrixXd& sigma = estimates.covariance;
-  MatrixXd c = MatrixXd::Zero(x.size() - static_cast<Index>(positions.kept.size()), x.size());
-  for (Index i = 0, row = 0; i < x.size(); ++i) {
-    const Index first = positions.first[static_cast<std::size_t>(i)];
-    if (first == i) continue;
-    c(row, i) = 1;
-    c(row++, first) = -1;
-  }
-  if (c.rows() == 0) return estimates;
-  const MatrixXd of_differences = c * sigma * c.transpose();
-  const MatrixXd gain =
-      sigma * c.transpose() * of_differences.completeOrthogonalDecomposition().pseudoInverse();
-  const VectorXd merged = x - gain * (c * x);
-  if ((c * merged).cwiseAbs().maxCoeff() > 1e-6 * x.cwiseAbs().maxCoeff()) throw InputError(what);
-  const MatrixXd covariance = sigma - gain * c * sigma;
-  const MatrixXd kept = covariance(positions.kept, positions.kept);
-  const MatrixXd shares = (MatrixXd::Identity(x.size(), x.size()) - gain * c)(positions.kept, Eigen::all);
-  return {merged(positions.kept), 0.5 * (kept + kept.transpose()),
-          transformed(estimates.over_root_dof, shares)};
+  return combined(estimates, merging_shares(estimates, positions, what));
+}
+
+std::optional<Eigen::RowVectorXd> shares_of_differences(const MatrixXd& covariance,
+                                                        const Coincidence& positions,
+                                                        const VectorXd& column) {
+  const MatrixXd c = differences(positions);
+  if (c.rows() == 0) return {};
+  // C x = β C h + C e, and the errors of x̂ have no part in C e: (I − G C) Σ Cᵀ = 0.
+  const Eigen::RowVectorXd score =
+      (c * column).transpose() * pseudo_inverse(c * covariance * c.transpose()) * c;
+  const double information = score * column;
+  if (!(information > 0)) return {};
+  return score / information;
 }
 
 }  // namespace tunnelrig

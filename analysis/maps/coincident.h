@@ -4,6 +4,7 @@
 #include "analysis/maps/map_input.h"
 #include "datasets/locations.h"
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,9 +42,24 @@ struct Coincidence {
 };
 Coincidence coincidence(const std::vector<TunnelPoint>& points);
 
-/// Generalised least squares under the constraint that estimates of one position agree; one estimate is left
-/// for each of `kept`. The covariance may be singular. Throws InputError with `what`, which says what
-/// differs, where estimates of one position differ and the covariance leaves no room for it.
+/// A x with its covariance, for m × n shares A.
+Estimates combined(const Estimates& estimates, const Eigen::MatrixXd& shares);
+
+/// The shares that each of n estimates has in those of `kept`, by generalised least squares under the
+/// constraint that estimates of one position agree. The covariance may be singular. Throws InputError with
+/// `what`, which says what differs, where estimates of one position differ and the covariance leaves no room
+/// for it.
+Eigen::MatrixXd merging_shares(const Estimates& estimates, const Coincidence& positions,
+                               const std::string& what);
+
+/// What merging_shares combines; throws as that does.
 Estimates merge_coincident(const Estimates& estimates, const Coincidence& positions, const std::string& what);
+
+/// The generalised least-squares estimate of β where estimate i is β column_i beside what is common to its
+/// position, from the differences within positions alone: shares of n estimates, whose errors are
+/// uncorrelated with those that merging leaves. Nothing where no differences show β.
+std::optional<Eigen::RowVectorXd> shares_of_differences(const Eigen::MatrixXd& covariance,
+                                                        const Coincidence& positions,
+                                                        const Eigen::VectorXd& column);
 
 }  // namespace tunnelrig

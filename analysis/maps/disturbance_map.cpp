@@ -223,6 +223,9 @@ FitSummary parse_fit(const Node& node) {
                        .rms_percent = loo["rms_percent"].number(),
                        .standardised_rms = {}};
   if (loo.has("standardised_rms")) fit.leave_one_out.standardised_rms = loo["standardised_rms"].number();
+  if (node.has("offset_percent")) {
+    fit.offset = RigOffset{node["offset_percent"].number(), parse_u95(node["offset_u95_percent"])};
+  }
   return fit;
 }
 
@@ -238,7 +241,12 @@ json matrix_json(const std::vector<double>& values, const MapGrid& grid) {
 json fit_json(const FitSummary& fit) {
   json loo = {{"locations", fit.leave_one_out.locations}, {"rms_percent", fit.leave_one_out.rms_percent}};
   if (fit.leave_one_out.standardised_rms) loo["standardised_rms"] = *fit.leave_one_out.standardised_rms;
-  return {{"hyperparameters", fit.hyperparameters}, {"leave_one_out", loo}};
+  json fields{{"hyperparameters", fit.hyperparameters}, {"leave_one_out", loo}};
+  if (fit.offset) {
+    fields["offset_percent"] = fit.offset->value_percent;
+    fields["offset_u95_percent"] = fit.offset->u95_percent;
+  }
+  return fields;
 }
 
 json location_json(const MeasuredLocation& location) {
@@ -283,6 +291,8 @@ json to_json(const DisturbanceMap& map) {
 bool MapLayer::u95_known() const {
   return std::ranges::none_of(u95_percent, [](double u95) { return std::isnan(u95); });
 }
+
+bool RigOffset::significant() const { return std::abs(value_percent) > u95_percent; }
 
 std::string format_disturbance_map(const DisturbanceMap& map) {
   // One key a line, and one line for each element of an array of arrays or objects: readable, and diffs stay

@@ -36,8 +36,8 @@ struct MapLayer {
   bool u95_known() const;  // at every node
 };
 
-/// One measured location, as measured: U is not zero on the centre line here, ΔC_T is zero at OT. A u95 of
-/// NaN is not known.
+/// One measured location, as measured: U is not zero on the centre line here and holds the rig's offset, ΔC_T
+/// is zero at OT. A u95 of NaN is not known.
 struct MeasuredLocation {
   std::string label;
   double y_norm = 0, z_norm = 0;
@@ -53,9 +53,19 @@ struct LeaveOneOutSummary {
       standardised_rms;  // errors over their standard uncertainty; near 1 where that is right
 };
 
+/// What the rig reads of U where symmetry demands 0; in the measured values, and taken out of the map.
+struct RigOffset {
+  double value_percent = 0;
+  double u95_percent = 0;  // half width of the 95 % interval; NaN: not known
+
+  /// Beyond its own uncertainty.
+  bool significant() const;
+};
+
 struct FitSummary {
   std::map<std::string, double> hyperparameters;
   LeaveOneOutSummary leave_one_out;
+  std::optional<RigOffset> offset;  // of U
 };
 
 struct DisturbanceMap {

@@ -35,30 +35,66 @@ ThrustChange thrust_change(const MapInput& merged) {
           jacobian * jacobian.transpose()};
 }
 
-FieldData folded(const MapInput& merged, Parity parity, Estimates estimates, const MatrixXd& excess) {
+/// Shares of all locations in the observations: those that merging the images leaves, and what the
+/// differences between images say of an offset.
+struct Folding {
+  MatrixXd shares;
+  bool with_differences = false;
+};
+
+Folding folding(const Estimates& mirrored, const Coincidence& positions, Parity parity, const VectorXd& sign,
+                const std::string& source) {
+  Folding result{merging_shares(
+      mirrored, positions,
+      fmt::format("{}: mirror images differ, and their covariance says that they cannot", source))};
+  if (parity == Parity::kEven) return result;
+  const auto of_offset = shares_of_differences(mirrored.covariance, positions, sign);
+  if (!of_offset) return result;
+  result.with_differences = true;
+  result.shares.conservativeResize(result.shares.rows() + 1, Eigen::NoChange);
+  result.shares.bottomRows(1) = *of_offset;
+  return result;
+}
+
+/// Of merged images the field's excess counts once, as structure that both have; in their differences it can
+/// only be an error, of each alone.
+MatrixXd folded_excess(const MatrixXd& excess, const Coincidence& positions, const Folding& folding) {
+  const auto n = static_cast<Index>(positions.kept.size());
+  MatrixXd result = MatrixXd::Zero(folding.shares.rows(), folding.shares.rows());
+  result.topLeftCorner(n, n) = excess(positions.kept, positions.kept);
+  if (folding.with_differences) {
+    const Eigen::RowVectorXd shares = folding.shares.row(n);
+    result(n, n) = shares * excess * shares.transpose();
+  }
+  return result;
+}
+
+FieldData folded(const MapInput& merged, Parity parity, const Estimates& estimates, const MatrixXd& excess) {
   FieldData data{.parity = parity, .scatter_known = merged.scatter_known};
   VectorXd sign = VectorXd::Ones(estimates.values.size());
+  std::vector<TunnelPoint> points;
   for (Index i = 0; i < sign.size(); ++i) {
     const LocationEstimate& location = merged.locations[static_cast<std::size_t>(i)];
     if (parity == Parity::kOdd && location.y_norm < 0) sign(i) = -1;
-    data.points.push_back(folded_position(location));
+    points.push_back(folded_position(location));
   }
-  estimates.values = sign.asDiagonal() * estimates.values;
-  estimates.covariance = sign.asDiagonal() * estimates.covariance * sign.asDiagonal();
-  estimates.over_root_dof = transformed(estimates.over_root_dof, sign.asDiagonal());
-  const Coincidence positions = coincidence(data.points);
-  estimates = merge_coincident(
-      estimates, positions,
-      fmt::format("{}: mirror images differ, and their covariance says that they cannot", merged.source));
-  data.values = estimates.values;
-  data.covariance = estimates.covariance;
-  data.over_root_dof = estimates.over_root_dof;
-  data.excess = excess(positions.kept, positions.kept);
-  data.points.clear();
+  const Coincidence positions = coincidence(points);
+  const Estimates mirrored = combined(estimates, sign.asDiagonal());
+  const Folding onto_half = folding(mirrored, positions, parity, sign, merged.source);
+  const Estimates observed = combined(mirrored, onto_half.shares);
+  data.values = observed.values;
+  data.covariance = observed.covariance;
+  data.over_root_dof = observed.over_root_dof;
+  data.excess = folded_excess(excess, positions, onto_half);
+  data.offset_column =
+      parity == Parity::kOdd ? VectorXd(onto_half.shares * sign) : VectorXd::Zero(data.size());
   for (const Index i : positions.kept) {
-    const LocationEstimate& location = merged.locations[static_cast<std::size_t>(i)];
-    data.labels.push_back(location.label);
-    data.points.push_back(folded_position(location));
+    data.labels.push_back(merged.locations[static_cast<std::size_t>(i)].label);
+    data.points.push_back(points[static_cast<std::size_t>(i)]);
+  }
+  if (onto_half.with_differences) {
+    data.labels.emplace_back("mirror images");
+    data.points.emplace_back();
   }
   return data;
 }
@@ -93,6 +129,7 @@ FieldData without(const FieldData& data, Index left_out) {
   rest.values = data.values(kept);
   rest.covariance = data.covariance(kept, kept);
   rest.excess = data.excess(kept, kept);
+  rest.offset_column = data.offset_column(kept);
   for (const MatrixXd& source : data.over_root_dof) rest.over_root_dof.emplace_back(source(kept, kept));
   return rest;
 }

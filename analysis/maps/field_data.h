@@ -17,7 +17,9 @@ enum class Parity {
   kOdd    // U: f(−ȳ, z̄) = −f(ȳ, z̄)
 };
 
-/// n observations of a field that is 0 at OT, folded onto ȳ ≥ 0, one per position; per cent throughout.
+/// n observations of a field that is 0 at OT, folded onto ȳ ≥ 0, one per position; per cent throughout. Of an
+/// odd field measured on both sides there is one more, labelled "mirror images": what the differences between
+/// images say of the rig's offset, which stands on ȳ = 0, as locations there say the same.
 struct FieldData {
   Parity parity = Parity::kEven;
   std::vector<std::string> labels;
@@ -27,6 +29,9 @@ struct FieldData {
   /// What would be added to `covariance` if each location had one more error of variance 1, independent of
   /// the others. Not the identity for ΔC_T: OT's share of it reaches every other location.
   Eigen::MatrixXd excess;
+  /// What an offset of the rig of 1 adds to each value (rig_offset.h): 1 on the right, −1 on the left, 0 for
+  /// ΔC_T, in which no offset is told from a field.
+  Eigen::VectorXd offset_column;
   std::vector<Eigen::MatrixXd> over_root_dof;  // of each source of the measured covariance (Summary)
   bool scatter_known = true;                   // of MapInput
 

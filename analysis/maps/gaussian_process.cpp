@@ -45,7 +45,9 @@ GaussianProcess::GaussianProcess(FieldData data, const Hyperparameters& hyperpar
     observed.col(i) += covariance_with_data(data_.points[static_cast<std::size_t>(i)]);
   }
   factor_.compute(observed);
-  weights_ = factor_.solve(data_.values);
+  offset_column_ = column_of_offset(data_);
+  offset_ = offset_weights(factor_, offset_column_);
+  weights_ = factor_.solve(data_.values - offset_.weights.dot(data_.values) * offset_column_);
 }
 
 double GaussianProcess::covariance(const TunnelPoint& a, const TunnelPoint& b) const {
@@ -64,16 +66,24 @@ VectorXd GaussianProcess::covariance_with_data(const TunnelPoint& point) const {
 FieldEstimate GaussianProcess::at(const TunnelPoint& point) const {
   require_inside(point);
   const VectorXd with_data = covariance_with_data(point);
+  VectorXd weights = factor_.solve(with_data);  // of the values
   const double unexplained = covariance(point, point) - factor_.matrixL().solve(with_data).squaredNorm();
+  // (2.42), with h = 0 at the point: what is predicted is the field without the offset.
+  const double of_offset = weights.dot(offset_column_);
+  weights -= of_offset * offset_.weights;
   const double excess = std::pow(hyperparameters_.excess_percent, 2) * excess_share(data_.parity, point);
-  const double variance = std::max(0.0, unexplained) + excess;
-  const double dof = effective_dof(data_.over_root_dof, factor_.solve(with_data), variance);
+  const double variance = std::max(0.0, unexplained) + of_offset * of_offset * offset_.variance + excess;
+  const double dof = effective_dof(data_.over_root_dof, weights, variance);
   return {with_data.dot(weights_), std::sqrt(variance), dof};
 }
 
+std::optional<FieldEstimate> GaussianProcess::offset() const { return estimate_of(offset_, data_); }
+
 std::vector<LeftOut> GaussianProcess::leave_one_out() const {
-  // Rasmussen & Williams (2006), (5.12)
-  const MatrixXd inverse = factor_.solve(MatrixXd::Identity(data_.size(), data_.size()));
+  // Rasmussen & Williams (2006), (5.12), with P in place of the inverse: the offset is estimated anew each
+  // time (Dubrule 1983).
+  const MatrixXd inverse =
+      without_offset(factor_.solve(MatrixXd::Identity(data_.size(), data_.size())), offset_);
   std::vector<LeftOut> result;
   for (Index i = 0; i < data_.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);

@@ -3,7 +3,9 @@
 
 #include "analysis/maps/field_data.h"
 #include "analysis/maps/field_estimate.h"
+#include "analysis/maps/rig_offset.h"
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -29,13 +31,18 @@ Eigen::Array3d matern(const Hyperparameters& h, double dy, double dz);
 /// Covariance of the observations' errors: the measured one and the excess.
 Eigen::MatrixXd noise_covariance(const FieldData& data, const Hyperparameters& hyperparameters);
 
-/// Posterior of a field under given hyperparameters. Rasmussen & Williams (2006), (2.25), (2.26).
+/// Posterior of a field under given hyperparameters, and of the rig's offset beside it, of which nothing is
+/// known before. Rasmussen & Williams (2006), (2.25), (2.26), (2.42).
 class GaussianProcess {
  public:
   GaussianProcess(FieldData data, const Hyperparameters& hyperparameters);
 
   /// Throws InputError outside [−1, 1]².
   FieldEstimate at(const TunnelPoint& point) const;
+
+  /// The rig's offset, which is in the measured values and not in the field; nothing where no location shows
+  /// it.
+  std::optional<FieldEstimate> offset() const;
 
   /// In closed form. What is predicted is the measurement, with the error that it shares with the others as
   /// far as those show it. An odd field's locations on ȳ = 0 are not listed: symmetry alone decides there.
@@ -50,7 +57,9 @@ class GaussianProcess {
   FieldData data_;
   Hyperparameters hyperparameters_;
   Eigen::LLT<Eigen::MatrixXd> factor_;  // of the covariance of the observations, K + N
-  Eigen::VectorXd weights_;             // (K + N)⁻¹ values
+  Eigen::VectorXd offset_column_;
+  OffsetWeights offset_;
+  Eigen::VectorXd weights_;  // (K + N)⁻¹ (values less the offset)
 };
 
 }  // namespace tunnelrig

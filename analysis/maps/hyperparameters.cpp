@@ -1,5 +1,6 @@
 #include "analysis/maps/hyperparameters.h"
 
+#include "analysis/maps/rig_offset.h"
 #include "analysis/maps/symmetric_kernel.h"
 
 #include <algorithm>
@@ -34,7 +35,9 @@ struct LogPrior {
 
 LogPrior log_prior(const FieldData& data, const HyperparameterPriors& priors) {
   const auto n = static_cast<double>(data.size());
-  const double rms = std::max(std::sqrt(data.values.squaredNorm() / n), 1e-3);
+  const VectorXd field =
+      data.values - offset_weights_on_centre_line(data).weights.dot(data.values) * column_of_offset(data);
+  const double rms = std::max(std::sqrt(field.squaredNorm() / n), 1e-3);
   // The mean square scatter that the measured covariance makes between locations: what they share drops out.
   const double scatter = (data.covariance.trace() - data.covariance.sum() / n) / (n - 1);
   const double noise = std::max(std::sqrt(std::max(0.0, scatter)), 0.01 * rms);
@@ -42,7 +45,8 @@ LogPrior log_prior(const FieldData& data, const HyperparameterPriors& priors) {
           {priors.amplitude_log_std, priors.length_log_std, priors.length_log_std, priors.excess_log_std}};
 }
 
-/// Value and gradient of −log p(values | parameters), Rasmussen & Williams (2006), (5.8), (5.9).
+/// Value and gradient of −log p(values | parameters), Rasmussen & Williams (2006), (5.8), (5.9); with a free
+/// offset (2.45), whose gradient has P in place of the inverse.
 struct NegativeLogLikelihood {
   double value = std::numeric_limits<double>::infinity();
   Parameters gradient = Parameters::Zero();
@@ -66,11 +70,15 @@ NegativeLogLikelihood negative_log_likelihood(const FieldData& data, const Param
   const MatrixXd covariance = kernel[0] + noise_covariance(data, h);
   const Eigen::LLT<MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) return {};
-  const VectorXd weights = factor.solve(data.values);
+  const VectorXd column = column_of_offset(data);
+  const OffsetWeights offset = offset_weights(factor, column);
+  const MatrixXd inverse = without_offset(factor.solve(MatrixXd::Identity(n, n)), offset);
+  const VectorXd weights = factor.solve(data.values - offset.weights.dot(data.values) * column);
   const VectorXd diagonal = factor.matrixLLT().diagonal();
-  const MatrixXd slope = 0.5 * (factor.solve(MatrixXd::Identity(n, n)) - weights * weights.transpose());
+  const double of_offset = offset.variance > 0 ? -0.5 * std::log(offset.variance) : 0;
+  const MatrixXd slope = 0.5 * (inverse - weights * weights.transpose());
   const double by_excess = 2 * h.excess_percent * h.excess_percent * slope.cwiseProduct(data.excess).sum();
-  return {0.5 * data.values.dot(weights) + diagonal.array().log().sum(),
+  return {0.5 * data.values.dot(weights) + diagonal.array().log().sum() + of_offset,
           {2 * slope.cwiseProduct(kernel[0]).sum(), slope.cwiseProduct(kernel[1]).sum(),
            slope.cwiseProduct(kernel[2]).sum(), by_excess}};
 }

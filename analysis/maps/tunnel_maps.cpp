@@ -12,6 +12,9 @@ FittedField fit(const FieldData& data, const MapSettings& settings) {
   return GaussianProcess(data, fit_hyperparameters(data, settings.priors));
 }
 
+/// To 10⁻⁶, far below what is known; a −0 becomes 0.
+double rounded(double percent) { return std::round(percent * 1e6) / 1e6 + 0.0; }
+
 FitSummary summary_of(const FittedField& field) {
   FitSummary summary{.leave_one_out = summarize(leave_one_out(field))};
   if (const auto* process = std::get_if<GaussianProcess>(&field)) {
@@ -21,13 +24,13 @@ FitSummary summary_of(const FittedField& field) {
                                {"length_z", h.length_z},
                                {"excess_percent", h.excess_percent}};
   }
+  if (const auto offset = offset_of(field)) {
+    summary.offset = RigOffset{rounded(offset->value), rounded(offset->u95())};
+  }
   return summary;
 }
 
 constexpr double kNormalCoverage = 1.96;  // flight draws normal errors: u95 over this, whatever the dof
-
-/// To 10⁻⁶, far below what is known; a −0 becomes 0.
-double rounded(double percent) { return std::round(percent * 1e6) / 1e6 + 0.0; }
 
 }  // namespace
 
@@ -52,6 +55,10 @@ TunnelMaps fit_maps(const MapInput& input, const MapSettings& settings) {
 
 FieldEstimate estimate_at(const FittedField& field, const TunnelPoint& point) {
   return std::visit([&](const auto& fitted) { return fitted.at(point); }, field);
+}
+
+std::optional<FieldEstimate> offset_of(const FittedField& field) {
+  return std::visit([](const auto& fitted) { return fitted.offset(); }, field);
 }
 
 std::vector<LeftOut> leave_one_out(const FittedField& field) {

@@ -8,6 +8,7 @@
 #include "analysis/maps/thin_plate_spline.h"
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -41,6 +42,10 @@ TunnelMaps fit_maps(const MapInput& input, const MapSettings& settings = {});
 
 /// The field at a point, per cent. Throws InputError outside [−1, 1]².
 FieldEstimate estimate_at(const FittedField& field, const TunnelPoint& point);
+
+/// The constant that the rig adds to what it measures of a field (rig_offset.h), per cent; nothing where no
+/// location shows it, and none of ΔC_T.
+std::optional<FieldEstimate> offset_of(const FittedField& field);
 
 /// How well each location is predicted by the others.
 std::vector<LeftOut> leave_one_out(const FittedField& field);

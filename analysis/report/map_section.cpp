@@ -11,6 +11,7 @@ Json layer_json(const MapLayer& layer, const FitSummary& fit) {
             {"hyperparameters", fit.hyperparameters},
             {"leave_one_out_rms_percent", fit.leave_one_out.rms_percent}};
   json["leave_one_out_standardised"] = maybe(fit.leave_one_out.standardised_rms);
+  if (fit.offset) json["offset"] = {fit.offset->value_percent, maybe(fit.offset->u95_percent)};
   return json;
 }
 

@@ -13,8 +13,7 @@ const fields = {
     of: 'U',
     tells:
         'The right pair minus the left pair, over all four. Blue (negative): the right pair lifts less and the ' +
-        'vehicle rolls to the right; red: to the left. On the middle plane the map is 0 by symmetry: an ' +
-        'offset measured there is taken for an error that all locations share, and is not in the map.',
+        'vehicle rolls to the right; red: to the left. On the middle plane the map is 0 by symmetry.',
   },
 };
 
@@ -210,6 +209,17 @@ function fitOf({leave_one_out_rms_percent: rms, leave_one_out_standardised: stan
       `${fixed(rms, 2)} percentage points (root mean square)${times}.`;
 }
 
+/** What the rig adds to a field at every location, which the middle plane shows. */
+function offsetOf({offset}) {
+  if (!offset) return '';
+  const [value, u95] = offset;
+  const isSeen = known(u95) && Math.abs(value) > u95;
+  return sentences(
+      `The offset of the rig, ${withU95(value, u95, true)} %, is in the values measured at the crosses and`,
+      'has been taken out of the map.',
+      isSeen && 'Symmetry demands 0 of it: check the factors of propellers.csv, the arms and the cells.');
+}
+
 function mapFigure(maps, field) {
   const {title, of, tells} = fields[field];
   let layer = 'value';
@@ -222,7 +232,7 @@ function mapFigure(maps, field) {
   });
   const mirrored = !(onSide(maps, -1) && onSide(maps, 1));
   const caption = sentences(
-      tells, `Crosses: the ${maps.locations.length} measured locations.`,
+      tells, offsetOf(maps[field]), `Crosses: the ${maps.locations.length} measured locations.`,
       mirrored && 'Dashed lines: the mirror image of the measured half.',
       'U95, the half width of the 95 % interval, comes from the covariance of the locations (repeats, sessions,',
       `and what they share) and from the field in between (${maps.method.replaceAll('-', ' ')}).`,

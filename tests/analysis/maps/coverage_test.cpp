@@ -60,6 +60,32 @@ TEST(Coverage, OfTheGaussianProcessIsNearNominal) {
   }
 }
 
+/// Share of campaigns whose interval holds the offset that their rig has.
+double coverage_of_offset(std::uint64_t seed, MapMethod method, const test::MeasurementErrors& errors) {
+  constexpr int kRigs = 200;
+  constexpr double kOffset_percent = 1;
+  int covered = 0;
+  for (std::uint64_t rig = 0; rig < kRigs; ++rig) {
+    MapInput input = test::published_input(seed + rig, errors);
+    for (LocationEstimate& location : input.locations) location.u_percent += kOffset_percent;
+    const FieldEstimate offset = *offset_of(fit_maps(input, {.method = method}).uneven_thrust);
+    covered += std::abs(offset.value - kOffset_percent) < offset.u95();
+  }
+  return static_cast<double>(covered) / kRigs;
+}
+
+TEST(Coverage, OfTheRigsOffsetIsNominal) {
+  const std::uint64_t seed = test::seed();
+  for (const double shared_percent : {0.0, 0.5}) {
+    for (const MapMethod method : test::kMethods) {
+      const double measured = coverage_of_offset(seed, method, {.shared_u_percent = shared_percent});
+      std::printf("seed %llu, shared %.1f %%, %s: coverage of the rig's offset %.3f\n",
+                  static_cast<unsigned long long>(seed), shared_percent, name_of(method).c_str(), measured);
+      EXPECT_NEAR(measured, 0.95, 0.06);  // four standard deviations of 200 campaigns
+    }
+  }
+}
+
 /// Means over campaigns of one field's errors in percentage points.
 struct FieldErrors {
   double leave_one_out = 0, standardised = 0, off_grid = 0;

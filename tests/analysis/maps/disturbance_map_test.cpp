@@ -52,7 +52,23 @@ TEST(DisturbanceMap, ComesBackAsItWas) {
   EXPECT_EQ(back.delta_ct_fit.leave_one_out.locations, 41);
   EXPECT_EQ(back.uneven_thrust_fit.leave_one_out.standardised_rms,
             map.uneven_thrust_fit.leave_one_out.standardised_rms);
+  ASSERT_TRUE(back.uneven_thrust_fit.offset);
+  EXPECT_EQ(back.uneven_thrust_fit.offset->value_percent, map.uneven_thrust_fit.offset->value_percent);
+  EXPECT_EQ(back.uneven_thrust_fit.offset->u95_percent, map.uneven_thrust_fit.offset->u95_percent);
+  EXPECT_FALSE(back.delta_ct_fit.offset);
   EXPECT_EQ(back.provenance, map.provenance);
+}
+
+TEST(DisturbanceMap, NeedsNoOffset) {
+  DisturbanceMap map = example();
+  map.uneven_thrust_fit.offset.reset();
+  EXPECT_FALSE(parse_disturbance_map(format_disturbance_map(map), "m.json").uneven_thrust_fit.offset);
+}
+
+TEST(DisturbanceMap, AnOffsetIsSignificantBeyondAKnownUncertainty) {
+  EXPECT_TRUE((RigOffset{-1, 0.5}.significant()));
+  EXPECT_FALSE((RigOffset{0.4, 0.5}.significant()));
+  EXPECT_FALSE((RigOffset{1, std::nan("")}.significant()));
 }
 
 TEST(DisturbanceMap, WhatIsNotKnownIsNull) {

@@ -22,6 +22,29 @@ using test::message_of;
 using test::published_input;
 using testing::HasSubstr;
 
+/// Best linear unbiased prediction with one free coefficient β, written out as the system with a Lagrange
+/// multiplier (Cressie 1993, *Statistics for Spatial Data*, 3.4): [K h; hᵀ 0] [w; m] = [k; h_x].
+struct UniversalKriging {
+  MatrixXd covariance;
+  VectorXd values, column;  // of β; zeros: there is no β
+
+  /// What is predicted has the covariance `with_data` with the values and holds `share` β.
+  FieldEstimate predict(const VectorXd& with_data, double variance, double share) const {
+    const Index n = values.size(), m = column.any() ? n + 1 : n;
+    MatrixXd system = MatrixXd::Zero(m, m);
+    VectorXd right = VectorXd::Zero(m);
+    system.topLeftCorner(n, n) = covariance;
+    right.head(n) = with_data;
+    if (m > n) {
+      system.col(n).head(n) = column;
+      system.row(n).head(n) = column.transpose();
+      right(n) = share;
+    }
+    const VectorXd solved = system.fullPivLu().solve(right);
+    return {solved.head(n).dot(values), std::sqrt(variance - solved.dot(right))};
+  }
+};
+
 const std::vector<TunnelPoint> kPoints = {{0.3, 0.7}, {0.999, -0.05}, {0.123456, -0.987}, {1, 1}, {0.5, 0}};
 
 class Field : public testing::TestWithParam<MapMethod> {
@@ -71,8 +94,11 @@ TEST_P(Field, IsExpandedByTheDegreesOfFreedomOfWhatItLeansOn) {
   EXPECT_GT(there.u95(), 1.01 * before.u95());
   EXPECT_NEAR(there.u95(), student_t_quantile(0.975, there.dof) * there.standard_uncertainty, 1e-12);
   if (GetParam() == MapMethod::kThinPlateSpline) {
-    // Its weights at a measured place are 1 and 0.
-    EXPECT_NEAR(there.dof, std::pow(0.01 + 0.04, 2) / (0.04 * 0.04 / 2 + 0.01 * 0.01 / 2), 1e-6);
+    // Its weights at a measured place are 1 and 0, and −1/7 on ȳ = 0: what all share is gone with the offset.
+    EXPECT_NEAR(there.standard_uncertainty, std::sqrt(0.01 + 0.01 / 7), 1e-6);
+    EXPECT_NEAR(there.dof, 2, 1e-6);
+    EXPECT_NEAR(offset_of(maps.uneven_thrust)->dof,
+                std::pow(0.04 + 0.01 / 7, 2) / (0.04 * 0.04 / 2 + std::pow(0.01 / 7, 2) / 2), 1e-6);
   }
   const MapGrid grid = regular_grid(5);
   EXPECT_EQ(sample(maps.delta_ct, grid).u95_percent, sample(known.delta_ct, grid).u95_percent);
@@ -162,8 +188,10 @@ TEST(ThinPlateSpline, PassesThroughEveryMeasuredValue) {
     for (Index i = 0; i < data.size(); ++i) {
       const TunnelPoint& point = data.points[static_cast<std::size_t>(i)];
       if (data.parity == Parity::kOdd && point.y_norm == 0) continue;
-      EXPECT_NEAR(spline.at(point).value, data.values(i), 1e-9);
-      EXPECT_NEAR(spline.at(point).standard_uncertainty, std::sqrt(data.covariance(i, i)), 1e-9);
+      const FieldEstimate offset = spline.offset().value_or(FieldEstimate{});
+      EXPECT_NEAR(spline.at(point).value, data.values(i) - offset.value, 1e-9);
+      EXPECT_NEAR(spline.at(point).standard_uncertainty,
+                  std::hypot(std::sqrt(data.covariance(i, i)), offset.standard_uncertainty), 1e-9);
     }
   }
 }
@@ -175,7 +203,8 @@ TEST(ThinPlateSpline, LeaveOneOutIsWhatRefittingGives) {
     for (const LeftOut& left : ThinPlateSpline(data).leave_one_out()) {
       const Index i = std::find(data.labels.begin(), data.labels.end(), left.label) - data.labels.begin();
       const ThinPlateSpline rest(without(data, i));
-      EXPECT_NEAR(left.predicted, rest.at(data.points[static_cast<std::size_t>(i)]).value, 1e-8)
+      const double offset = rest.offset() ? rest.offset()->value : 0;
+      EXPECT_NEAR(left.predicted, rest.at(data.points[static_cast<std::size_t>(i)]).value + offset, 1e-8)
           << left.label;
     }
   }
@@ -205,10 +234,11 @@ TEST(GaussianProcess, LeaveOneOutIsWhatRefittingGives) {
       for (Index j = 0; j < data.size(); ++j) {
         if (j != i) rest.push_back(j);
       }
-      const VectorXd with_rest = covariance(rest, i);
-      const VectorXd weights = covariance(rest, rest).fullPivLu().solve(with_rest);
-      EXPECT_NEAR(left.predicted, weights.dot(data.values(rest)), 1e-8) << left.label;
-      EXPECT_NEAR(left.standard_uncertainty, std::sqrt(covariance(i, i) - weights.dot(with_rest)), 1e-8);
+      const UniversalKriging kriging{covariance(rest, rest), data.values(rest), data.offset_column(rest)};
+      const FieldEstimate expected =
+          kriging.predict(covariance(rest, i), covariance(i, i), data.offset_column(i));
+      EXPECT_NEAR(left.predicted, expected.value, 1e-8) << left.label;
+      EXPECT_NEAR(left.standard_uncertainty, expected.standard_uncertainty, 1e-8);
     }
   }
 }
@@ -219,7 +249,9 @@ TEST(GaussianProcess, LeavingOutIsRefittingTheMapWhereErrorsAreIndependent) {
   for (const LeftOut& left : GaussianProcess(data, h).leave_one_out()) {
     const Index i = std::find(data.labels.begin(), data.labels.end(), left.label) - data.labels.begin();
     const GaussianProcess rest(without(data, i), h);
-    EXPECT_NEAR(left.predicted, rest.at(data.points[static_cast<std::size_t>(i)]).value, 1e-7) << left.label;
+    EXPECT_NEAR(left.predicted,
+                rest.at(data.points[static_cast<std::size_t>(i)]).value + rest.offset()->value, 1e-7)
+        << left.label;
   }
 }
 

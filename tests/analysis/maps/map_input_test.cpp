@@ -256,8 +256,15 @@ TEST(FieldData, MirrorImagesAreOneObservation) {
   const MapInput merged = merge_locations(with(input, image, 1e-4, 0.1));
   ASSERT_EQ(merged.locations.size(), 43u);
   const FieldData data = uneven_thrust_data(merged);
-  ASSERT_EQ(data.size(), 42);
+  ASSERT_EQ(data.size(), 43);
   EXPECT_NEAR(data.values(12), input.locations[12].u_percent + 0.15, 1e-9);
+  EXPECT_NEAR(data.offset_column(12), 0, 1e-12);
+  // And half their sum is one of the rig's offset.
+  EXPECT_EQ(data.points[42].y_norm, 0);
+  EXPECT_NEAR(data.values(42), -0.15, 1e-9);
+  EXPECT_NEAR(data.covariance(42, 42), 0.1 * 0.1 / 2, 1e-12);
+  EXPECT_NEAR(data.covariance(42, 12), 0, 1e-12);
+  EXPECT_NEAR(data.offset_column(42), 1, 1e-12);
   EXPECT_EQ(measured_locations(merged)[42].y_norm, image.y_norm);
 }
 

@@ -92,6 +92,10 @@ TEST_F(ReportTest, MapsAreThoseOfTheFit) {
   EXPECT_EQ(section["delta_ct"]["u95_percent"].get<std::vector<double>>(), map.delta_ct.u95_percent);
   EXPECT_EQ(section["uneven_thrust"]["value_percent"].get<std::vector<double>>(),
             map.uneven_thrust.value_percent);
+  ASSERT_TRUE(map.uneven_thrust_fit.offset);
+  EXPECT_EQ(section["uneven_thrust"]["offset"], Json::array({map.uneven_thrust_fit.offset->value_percent,
+                                                             map.uneven_thrust_fit.offset->u95_percent}));
+  EXPECT_FALSE(section["delta_ct"].contains("offset"));
   double greatest = 0;
   for (const MeasuredLocation& location : map.locations)
     greatest = std::max(greatest, location.delta_ct_percent);
