@@ -156,7 +156,8 @@ void add_explain(CLI::App& app, Work& work) {
   auto options = std::make_shared<ExplainOptions>();
   CLI::App* verb = app.add_subcommand("explain", "Trace the residual to the effect that the model lacks");
   verb->footer(
-      "Seals a quarter of the sessions, searches on the rest, opens the seal once; docs/closed-loop.md.\n\n"
+      "Seals a quarter of the sessions, searches on the rest, opens the seal at the end; "
+      "docs/closed-loop.md.\n\n"
       "Examples: tunnelrig explain --db my.db\n"
       "          tunnelrig explain --db my.db --json explanation.json --html explanation.html\n"
       "          tunnelrig explain --list --db my.db");

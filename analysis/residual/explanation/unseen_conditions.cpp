@@ -66,7 +66,8 @@ void warn_of_unseen(const Observations& observations, const std::vector<const Ef
     }
     const bool named = is_needed(covariate.name, effects);
     const std::string why = unseen(observations, covariate, rows, named);
-    if (why.empty()) continue;
+    // A schema has to say the diameter, and most tables are of one propeller.
+    if (why.empty() || (covariate.name == kDiameter && is_constant(covariate))) continue;
     explanation.warnings.push_back(
         fmt::format("{} {}: nothing can be found that follows it", covariate.name, why));
     if (!named) add_structure(covariate.name, why, explanation);
@@ -120,6 +121,17 @@ void report_incomplete(const Observations& observations, const std::vector<const
     add_structure(covariate, "is " + why, explanation);
 }
 
+/// A group of a row or two says little but its own constant, and time goes with the cube of the groups.
+void warn_of_many_groups(const Observations& observations, Explanation& explanation) {
+  constexpr int kFew = 2, kMany = 50;  // rows of a group, and groups
+  if (observations.from_table && observations.groups() > kMany &&
+      kFew * observations.groups() > observations.rows())
+    explanation.warnings.push_back(
+        fmt::format("{} groups for {} rows: most rows are used up by their group's constant; are these "
+                    "groups meant?",
+                    observations.groups(), observations.rows()));
+}
+
 }  // namespace
 
 std::vector<std::string> collinear_with(const Observations& observations, const Covariate& covariate) {
@@ -137,6 +149,7 @@ void report_unseen_conditions(const Observations& observations, const std::vecto
   report_incomplete(observations, effects, explanation);
   warn_of_unseen(observations, effects, rows, explanation);
   warn_of_collinear(observations, effects, explanation);
+  warn_of_many_groups(observations, explanation);
 }
 
 }  // namespace tunnelrig

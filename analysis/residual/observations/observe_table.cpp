@@ -296,9 +296,13 @@ void set_baseline(const TableSource& source, const ObservationChoice& choice, Ob
     result.sign.resize(0);
     result.known.setOnes();
   }
-  if (kind == "power" && !result.multiplicative)
+  if (kind == "power" && !result.multiplicative) {
+    const Index not_above_0 = (result.value.array() <= 0).count();
     throw InputError::in(source.row(*row_of_other_sign(source, result)).place,
-                         "--baseline {}: the response must have one sign", choice.baseline);
+                         "--baseline {}: the response must have one sign, and {} of {} rows have not that of "
+                         "the others: leave them out, or take linear:COLUMN",
+                         choice.baseline, std::min(not_above_0, result.rows() - not_above_0), result.rows());
+  }
   result.slopes.resize(source.count(), 1);
   for (Index r = 0; r < source.count(); ++r) {
     const double x = source.cell(r, column);

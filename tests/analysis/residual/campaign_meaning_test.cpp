@@ -110,6 +110,18 @@ TEST_F(CampaignMeaning, ADriftOfTheZeroIsHeldAgainstTheTemperatureOfTheTares) {
   }
 }
 
+/// Between two tares a run's zero was taken at its own place in the order, to the last bit: a step before it
+/// has gone with the zero.
+TEST_F(CampaignMeaning, AZeroBetweenTwoTaresStandsInTheOrderWhereItsRunDoes) {
+  add_sessions(Tares::kBothEnds, 0);
+  const Observations o = observe_campaign(data, {});
+  const Covariate* order = o.find("run_order");
+  ASSERT_NE(order, nullptr);
+  ASSERT_GT(order->at_zero.size(), 0);
+  for (Index row = 0; row < o.rows(); ++row)
+    EXPECT_EQ(order->at_zero(row, 0), static_cast<double>(row)) << o.name[static_cast<std::size_t>(row)];
+}
+
 TEST_F(CampaignMeaning, OneLocationHasOneCoefficientHoweverItIsWritten) {
   add_sessions(Tares::kNone, 0);
   int centre = 0;

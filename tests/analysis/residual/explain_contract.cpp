@@ -57,6 +57,7 @@ void expect_contract(const Explanation& explanation) {
                           "campaign",
                           "response",
                           "unit",
+                          "seal_chose",
                           "baseline",
                           "verdict",
                           "noise_floor",

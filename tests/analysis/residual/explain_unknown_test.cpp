@@ -60,6 +60,8 @@ TEST_F(ExplainTest, SessionsThatDifferByFarMoreThanTheirRunsAreUnknown) {
   EXPECT_EQ(e.verdict, "unknown");
   ASSERT_EQ(e.unknown.size(), 1u);
   EXPECT_EQ(e.unknown[0].covariate, "session");
+  EXPECT_LT(e.unknown[0].p_value, 0.025) << "of a ratio of 2 or less";
+  EXPECT_GT(e.unknown[0].p_value, 0);
   ASSERT_EQ(e.unknown[0].shape.size(), 16u) << "one point of each session";
   for (const auto& [x, y, low, high] : e.unknown[0].shape) {
     EXPECT_LT(low, y);

@@ -246,6 +246,7 @@ TEST_P(HeldOut, ModelsAreComparedByRunsThatBothPredict) {
   ASSERT_EQ(left_out_errors(wide).all().count(), 0);
   const LossDifference gain = compare(left_out_errors(o), left_out_errors(wide));
   EXPECT_EQ(gain.mean, 0);
+  EXPECT_EQ(gain.expected_standard_error, 0) << "of no runs";
   EXPECT_FALSE(gain.told_apart());
 }
 
