@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 
@@ -216,6 +217,67 @@ std::string column_behind(const std::string& derived) {
   return derived;
 }
 
+/// A found curve as it is drawn, in the place of its own columns in the fit.
+struct FittedCurve {
+  Curve curve;
+  VectorXd amplitude;
+  MatrixXd covariance;
+};
+
+FittedCurve fit_as_drawn(const Observations& observations, const JointFit& fit, const Curve& found,
+                         const std::vector<int>& rows) {
+  FittedCurve result{as_drawn(observations, found, rows), {}, {}};
+  std::vector<Components> others = fit.linear.columns;
+  auto last = others.end();
+  for (auto other = fit.model.curves.rbegin(); !other->is_like(found); ++other)
+    last -= static_cast<std::ptrdiff_t>(other->columns.size());
+  others.erase(last - static_cast<std::ptrdiff_t>(found.columns.size()), last);
+  std::vector<Components> columns = others;
+  columns.insert(columns.end(), result.curve.columns.begin(), result.curve.columns.end());
+  const Components y = difference(response_components(observations), fit.linear.offset);
+  const AmplitudeFit amplitudes = fit_amplitudes(observations, y, columns, fit.variances, rows);
+  const auto k = static_cast<Index>(result.curve.columns.size());
+  result.amplitude = amplitudes.amplitude.tail(k);
+  result.covariance = amplitudes.covariance.bottomRightCorner(k, k);
+  if (found.x.size() > 0)
+    keep_to_its_own_size(observations, rows, others, result.curve, result.amplitude, result.covariance);
+  return result;
+}
+
+/// What is drawn, stretch by stretch.
+std::vector<std::vector<Drawn>> pieces_to_draw(const Observations& observations, const Curve& curve,
+                                               const std::vector<int>& rows) {
+  if (curve.shape == CurveShape::kLevels) return {drawn_levels(curve)};
+  std::vector<std::vector<Drawn>> pieces;
+  if (curve.x.size() == 0) {  // within the run
+    const double duration_s = observations.duration_s.maxCoeff();
+    pieces = {drawn_curve(curve, places_to_draw({}, 0, duration_s, false), 0, duration_s)};
+  } else {
+    const std::vector<double> seen = values_seen(curve, rows);
+    const bool in_logarithm = has_waves(curve.shape) && is_of_logarithm(curve.shape);
+    for (const Stretch& stretch : stretches_of(observations, rows, curve))
+      pieces.push_back(drawn_curve(curve, places_to_draw(seen, stretch.low, stretch.high, in_logarithm),
+                                   curve.low, curve.high));
+  }
+  for (std::vector<Drawn>& points : pieces) take_out_baseline(observations, rows, curve, points);
+  return pieces;
+}
+
+/// The points with their band, and the amplitude, which is the largest piece's.
+void draw(const std::vector<Drawn>& points, const FittedCurve& fitted, double scale,
+          UnknownStructure& result) {
+  double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
+  for (const Drawn& point : points) {
+    const double value = scale * point.columns.dot(fitted.amplitude);
+    const double half =
+        1.96 * scale * std::sqrt(std::max(0.0, point.columns.dot(fitted.covariance * point.columns)));
+    result.shape.push_back({point.x, value, value - half, value + half});
+    lowest = std::min(lowest, value);
+    highest = std::max(highest, value);
+  }
+  result.amplitude = std::max(result.amplitude, (highest - lowest) / 2);
+}
+
 }  // namespace
 
 UnknownStructure describe(const Observations& observations, const JointFit& fit, const FoundCurve& found,
@@ -237,49 +299,10 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
     if (covariate->derived) result.covariate = column_behind(covariate->name);
     result.collinear_with = collinear_with(observations, *covariate);
   }
-  const Curve curve = as_drawn(observations, found.curve, rows);
-  std::vector<Components> columns = fit.linear.columns;
-  auto last = columns.end();
-  for (auto other = fit.model.curves.rbegin(); !other->is_like(found.curve); ++other)
-    last -= static_cast<std::ptrdiff_t>(other->columns.size());
-  columns.erase(last - static_cast<std::ptrdiff_t>(found.curve.columns.size()), last);
-  columns.insert(columns.end(), curve.columns.begin(), curve.columns.end());
-  const Components y = difference(response_components(observations), fit.linear.offset);
-  const AmplitudeFit amplitudes = fit_amplitudes(observations, y, columns, fit.variances, rows);
-  const auto k = static_cast<Index>(curve.columns.size());
-  VectorXd amplitude = amplitudes.amplitude.tail(k);
-  MatrixXd covariance = amplitudes.covariance.bottomRightCorner(k, k);
-  const double scale = observations.response_per_y();
-  const bool within = found.curve.x.size() == 0;
-  if (!within)
-    keep_to_its_own_size(observations, rows, {columns.begin(), columns.end() - k}, curve, amplitude,
-                         covariance);
-  const double duration_s = observations.duration_s.maxCoeff();
-  std::vector<std::vector<Drawn>> pieces;
-  if (result.levels)
-    pieces.push_back(drawn_levels(curve));
-  else if (within)
-    pieces.push_back(drawn_curve(curve, places_to_draw({}, 0, duration_s, false), 0, duration_s));
-  else {
-    const std::vector<double> seen = values_seen(curve, rows);
-    const bool in_logarithm = has_waves(curve.shape) && is_of_logarithm(curve.shape);
-    for (const Stretch& stretch : stretches_of(observations, rows, curve))
-      pieces.push_back(drawn_curve(curve, places_to_draw(seen, stretch.low, stretch.high, in_logarithm),
-                                   curve.low, curve.high));
-  }
-  for (std::vector<Drawn>& points : pieces) {
-    if (!result.levels) take_out_baseline(observations, rows, curve, points);
-    if (!curve.strength) centre(points);
-    double lowest = 1e300, highest = -1e300;
-    for (const Drawn& point : points) {
-      const double value = scale * point.columns.dot(amplitude);
-      const double half =
-          1.96 * scale * std::sqrt(std::max(0.0, point.columns.dot(covariance * point.columns)));
-      result.shape.push_back({point.x, value, value - half, value + half});
-      lowest = std::min(lowest, value);
-      highest = std::max(highest, value);
-    }
-    result.amplitude = std::max(result.amplitude, (highest - lowest) / 2);
+  const FittedCurve fitted = fit_as_drawn(observations, fit, found.curve, rows);
+  for (std::vector<Drawn>& points : pieces_to_draw(observations, fitted.curve, rows)) {
+    if (!fitted.curve.strength) centre(points);
+    draw(points, fitted, observations.response_per_y(), result);
   }
   return result;
 }

@@ -146,6 +146,60 @@ VectorXd concatenated(const std::vector<VectorXd>& parts) {
   return result;
 }
 
+/// What one stratum's model says of runs that it has not seen: errors and variances, runs × modes.
+struct StratumErrors {
+  MatrixXd error, variance;
+  VectorXd whitened;
+};
+
+/// y and the columns of the runs to predict, without a baseline.
+struct Plain {
+  Stacked y, columns;
+};
+
+StratumErrors errors_of_stratum(const Observations& observations, const MixedModel& model, std::size_t s,
+                                const Fit& fit, const NullFit& null, Plain plain,
+                                const std::vector<int>& rows) {
+  const MixedModel::Stratum& stratum = model.strata()[s];
+  const Index n = static_cast<Index>(rows.size());
+  const double sigma = null.sigma[s], ratio = kRatios[null.ratio[s]];
+  const VectorXd scatter = stratum.means() ? observations.scatter.of_runs(rows) : VectorXd(VectorXd::Ones(n));
+  Stacked residual = plain.y - model.baseline_prediction(s, null.ratio[s], fit.y[s], rows);
+  Stacked variance = (scatter.array().square() + ratio).replicate(stratum.modes, 1);
+  variance += model.baseline_variance(s, null.ratio[s], rows).replicate(stratum.modes, 1);
+  variance *= sigma * sigma;
+  if (plain.columns.cols() > 0) {
+    const Stacked x = plain.columns - model.baseline_prediction(s, null.ratio[s], fit.columns[s], rows);
+    plain.y -= plain.columns * fit.amplitude;
+    residual -= x * fit.amplitude;
+    variance += ((x * fit.covariance).array() * x.array()).rowwise().sum().matrix();
+  }
+  StratumErrors result{residual.reshaped(n, stratum.modes), variance.reshaped(n, stratum.modes), {}};
+  if (stratum.means() && (observations.groups_within_blocks || !observations.held_out.empty()))
+    own_baseline(observations, rows,
+                 RunCovariance(observations, rows, scatter, sigma, ratio, model.run_correlation(s)),
+                 plain.y.reshaped(n, stratum.modes), plain.columns, fit.covariance, result.error,
+                 result.variance);
+  result.whitened =
+      whitened(observations, rows, result.error, scatter, sigma, ratio, model.run_correlation(s));
+  return result;
+}
+
+/// From errors of y and what they scatter by.
+void set_in_response_unit(const Observations& observations, const MatrixXd& error_y, const MatrixXd& std_y,
+                          HeldOutErrors& result) {
+  const MatrixXd value = observations.value(result.rows, Eigen::all),
+                 known = observations.known(result.rows, Eigen::all);
+  if (observations.multiplicative) {
+    const MatrixXd predicted = value.array() * (-error_y).array().exp();
+    result.error = predicted - value;
+    result.expected_std = predicted.cwiseAbs().cwiseProduct(std_y);
+  } else {
+    result.error = -known.cwiseProduct(error_y);
+    result.expected_std = known.cwiseAbs().cwiseProduct(std_y);
+  }
+}
+
 }  // namespace
 
 double HeldOutErrors::sum_of_squares() const { return error.array().isNaN().select(0, error).squaredNorm(); }
@@ -168,53 +222,20 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
   const std::vector<const Components*> items = pointers_to(columns);
   const Fit fit = fit_amplitudes(model, y, items, null);
   const Index n = static_cast<Index>(test_rows.size()), c = observations.channels();
-  HeldOutErrors result{test_rows, MatrixXd::Zero(n, c), MatrixXd::Zero(n, c), {}, fit.amplitude};
   std::vector<VectorXd> parts;
   MatrixXd error_by_mode = MatrixXd::Zero(n, c), variance_by_mode = MatrixXd::Zero(n, c);
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
     const MixedModel::Stratum& stratum = model.strata()[s];
-    const double sigma2 = null.sigma[s] * null.sigma[s];
-    Stacked plain = test.stack(s, {&y});
-    Stacked residual = plain - model.baseline_prediction(s, null.ratio[s], fit.y[s], test_rows);
-    const VectorXd scatter =
-        stratum.means() ? observations.scatter.of_runs(test_rows) : VectorXd(VectorXd::Ones(n));
-    Stacked variance = (scatter.array().square() + kRatios[null.ratio[s]]).replicate(stratum.modes, 1);
-    variance += model.baseline_variance(s, null.ratio[s], test_rows).replicate(stratum.modes, 1);
-    variance *= sigma2;
-    const Stacked stacked = test.stack(s, items);
-    if (!items.empty()) {
-      const Stacked x = stacked - model.baseline_prediction(s, null.ratio[s], fit.columns[s], test_rows);
-      plain -= stacked * fit.amplitude;
-      residual -= x * fit.amplitude;
-      variance += ((x * fit.covariance).array() * x.array()).rowwise().sum().matrix();
-    }
-    MatrixXd errors = Eigen::Map<const MatrixXd>(residual.data(), n, stratum.modes);
-    MatrixXd variances = Eigen::Map<const MatrixXd>(variance.data(), n, stratum.modes);
-    if (stratum.means() && (observations.groups_within_blocks || !observations.held_out.empty()))
-      own_baseline(observations, test_rows,
-                   RunCovariance(observations, test_rows, scatter, null.sigma[s], kRatios[null.ratio[s]],
-                                 model.run_correlation(s)),
-                   Eigen::Map<const MatrixXd>(plain.data(), n, stratum.modes), stacked, fit.covariance,
-                   errors, variances);
-    parts.push_back(whitened(observations, test_rows, errors, scatter, null.sigma[s], kRatios[null.ratio[s]],
-                             model.run_correlation(s)));
+    StratumErrors own = errors_of_stratum(observations, model, s, fit, null,
+                                          {test.stack(s, {&y}), test.stack(s, items)}, test_rows);
+    parts.push_back(std::move(own.whitened));
     if (!stratum.means()) continue;
-    error_by_mode.middleCols(stratum.first_mode, stratum.modes) = errors;
-    variance_by_mode.middleCols(stratum.first_mode, stratum.modes) = variances;
+    error_by_mode.middleCols(stratum.first_mode, stratum.modes) = own.error;
+    variance_by_mode.middleCols(stratum.first_mode, stratum.modes) = own.variance;
   }
-  result.whitened = concatenated(parts);
-  const MatrixXd error_y = error_by_mode * model.rotors_of_modes();
-  const MatrixXd std_y = (variance_by_mode * model.rotors_of_modes().cwiseAbs2()).cwiseSqrt();
-  for (Index r = 0; r < n; ++r)
-    for (Index channel = 0; channel < c; ++channel) {
-      const double value = observations.value(test_rows[static_cast<std::size_t>(r)], channel);
-      const double known = observations.known(test_rows[static_cast<std::size_t>(r)], channel);
-      const double predicted = observations.multiplicative ? value * std::exp(-error_y(r, channel))
-                                                           : value - known * error_y(r, channel);
-      result.error(r, channel) = predicted - value;
-      result.expected_std(r, channel) =
-          std::abs(observations.multiplicative ? predicted : known) * std_y(r, channel);
-    }
+  HeldOutErrors result{test_rows, {}, {}, concatenated(parts), fit.amplitude};
+  set_in_response_unit(observations, error_by_mode * model.rotors_of_modes(),
+                       (variance_by_mode * model.rotors_of_modes().cwiseAbs2()).cwiseSqrt(), result);
   return result;
 }
 

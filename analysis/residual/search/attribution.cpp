@@ -1,10 +1,10 @@
 #include "analysis/residual/likelihood/candidates.h"
 #include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/search/search.h"
+#include "calibration/distributions.h"
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace tunnelrig {
 
@@ -23,13 +23,14 @@ Attribution Search::run() {
   begin();
   add_effects();
   CurveScan curves = scan_curves();
-  // Once more where rotors differ: what was found while they were taken to be alike may have been scatter.
-  for (int again = 0;
-       again < 2 && (again == 0 || observations_.scatter.rotors_differ()) && begin_with_scatter_of(curves);
-       ++again) {
+  const auto begin_again = [&] {
+    if (!begin_with_scatter_of(curves)) return false;
     add_effects();
     curves = scan_curves();
-  }
+    return true;
+  };
+  // Once more where rotors differ: what was found while they were taken to be alike may have been scatter.
+  if (begin_again() && observations_.scatter.rotors_differ()) begin_again();
   add_curves(curves);
   find_confounded();
   smooth_curves();
@@ -141,13 +142,8 @@ double detectable_by_one(const MixedModel& mixed, const NullFit& variances, doub
     information += runs * of_all.segment(stratum.first_mode, stratum.modes).squaredNorm() /
                    (std::pow(variances.sigma[s], 2) * (1 + kRatios[variances.ratio[s]]));
   }
-  return deviates(-std::log10(alpha)) / std::sqrt(information);
-}
-
-double deviates(double evidence) {
-  double z = 0;
-  while (-std::log10(std::erfc(z / std::numbers::sqrt2)) < evidence) z += 0.01;
-  return z + 0.84;
+  constexpr double kPower = 0.8;
+  return (normal_quantile(1 - alpha / 2) + normal_quantile(kPower)) / std::sqrt(information);
 }
 
 Attribution attribute(const Observations& observations, const std::vector<int>& rows,

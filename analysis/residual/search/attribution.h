@@ -102,10 +102,6 @@ class OwnEvidence {
   Eigen::MatrixXd predicted_;
 };
 
-/// Standard errors that an effect must be of to reach an evidence four times in five: −log10 p of a two-sided
-/// normal deviate, and 0.84.
-double deviates(double evidence);
-
 /// Where no candidate can be tried: rms, in y, of a single effect on all rotors alike that varies from run to
 /// run, and would be found at 80 % power if it were the only candidate.
 double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha);
