@@ -6,18 +6,22 @@
 
 namespace tunnelrig {
 
-/// What data sets are drawn for: the first number of a stream, the place of the question is added to it.
+/// What data sets are drawn for: the place of the question in the search, from 1, is added to it.
 enum class Draws : std::uint64_t {
   kEffects = 0,
   kCurves = 1'000,
   kStillFound = 4'000,
   kBends = 5'000,
   kRivals = 6'000,
-  kCorrelation = 20'000,
-  kRotors = 21'000,
-  kRuns = 22'000,
-  kSessions = 23'000,
-  kContrasts = 24'000,
+};
+
+/// What runs that are alike are drawn for, to hold those of the data against.
+enum class ScatterDraws : std::uint64_t {
+  kCorrelation = 3'000,
+  kRotors = 4'000,
+  kRuns = 5'000,
+  kSessions = 6'000,
+  kContrasts = 7'000,
 };
 inline constexpr std::uint64_t kDrawsOnAllRuns = 2'000;           // added once the seal is open
 inline constexpr std::uint64_t kDrawsWithoutNormality = 500'000;  // added where runs keep their own sizes
