@@ -171,12 +171,36 @@ std::string contradiction(const AdoptedEffect& adopted, const Explanation& expla
   return "";
 }
 
+/// What speaks against a name.
+struct Against {
+  const AdoptedEffect* adopted;
+  std::string why;
+  bool never_stays;
+};
+
+/// Of several names that are refuted, those to take back before the rest is judged anew.
+std::vector<Against> to_go_first(std::vector<Against> against, const Observations& observations) {
+  // With the wrong one of two equals in, the sealed runs are far from all that was found, and no other effect
+  // is seen beside it.
+  const auto has_equals = [](const Against& refuted) { return !refuted.adopted->confounded_with.empty(); };
+  if (std::ranges::any_of(against, has_equals)) std::erase_if(against, std::not_fn(has_equals));
+  // Two formulas of one condition, neither of which is known beside the other, make any shape over it: the
+  // newest is none, and the other is judged without it.
+  for (std::size_t k = against.size(); k-- > 1;) {
+    const Term& newer = against[k].adopted->term;
+    const auto is_of_its_condition = [&](const Against& older) {
+      const Term& term = older.adopted->term;
+      return term.rotor == newer.rotor && share_a_condition(*term.effect, *newer.effect, observations);
+    };
+    if (std::none_of(against.begin(), against.begin() + static_cast<std::ptrdiff_t>(k), is_of_its_condition))
+      continue;
+    against[k].never_stays = true;
+    return {against[k]};
+  }
+  return against;
+}
+
 Refuted refuted(const Explanation& explanation, const Observations& observations) {
-  struct Against {
-    const AdoptedEffect* adopted;
-    std::string why;
-    bool never_stays;
-  };
   std::vector<Against> against;
   bool refutable = false;
   for (const AdoptedEffect& adopted : explanation.adopted) {
@@ -189,34 +213,15 @@ Refuted refuted(const Explanation& explanation, const Observations& observations
         adopted.at_bound || !contradicted.empty() || !no_more_than_a_line(adopted, observations).empty();
     against.push_back({&adopted, std::move(why), never_stays});
   }
-  // With the wrong one of two equals in, the sealed runs are far from all that was found, and no other effect
-  // is seen beside it: what has equals goes first, and the rest is judged beside the one that is left.
-  const auto has_equals = [](const Against& refuted) { return !refuted.adopted->confounded_with.empty(); };
-  if (std::ranges::any_of(against, has_equals)) std::erase_if(against, std::not_fn(has_equals));
-  // Two formulas of one condition, neither of which is known beside the other, make any shape over it: the
-  // newest is none, and the other is judged without it.
-  const auto of_one_condition = [&](const Against& a, const Against& b) {
-    const auto of_a = own_conditions(*a.adopted->term.effect, observations);
-    const auto of_b = own_conditions(*b.adopted->term.effect, observations);
-    return a.adopted->term.rotor == b.adopted->term.rotor &&
-           std::ranges::find_first_of(of_a, of_b) != of_a.end();
-  };
-  for (std::size_t k = against.size(); k-- > 1;)
-    if (std::any_of(against.begin(), against.begin() + static_cast<std::ptrdiff_t>(k),
-                    [&](const Against& older) { return of_one_condition(older, against[k]); })) {
-      against[k].never_stays = true;
-      against = {against[k]};
-      break;
-    }
   Refuted result;
-  for (auto& [adopted, why, never_stays] : against) {
+  for (auto& [adopted, why, never_stays] : to_go_first(std::move(against), observations)) {
     result.terms.push_back(adopted->term);
     result.why.push_back(std::move(why));
     result.beyond |= never_stays;
     result.structure |= adopted->bends_away || adopted->anywhere;
   }
-  result.all =
-      against.empty() && refutable && (curves_do_better(explanation) || baseline_does_better(explanation));
+  result.all = result.terms.empty() && refutable &&
+               (curves_do_better(explanation) || baseline_does_better(explanation));
   return result;
 }
 
@@ -257,9 +262,9 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
                             std::vector<const Effect*>& effects, SearchSettings& settings,
                             std::vector<std::string>& said) {
   std::vector<Found> before;
-  const bool chosen = explanation.seal_chose || refuted(explanation, observations).any();
-  for (Refuted found = refuted(explanation, observations); found.any();
-       found = refuted(explanation, observations)) {
+  Refuted found = refuted(explanation, observations);
+  const bool chosen = explanation.seal_chose || found.any();
+  for (; found.any(); found = refuted(explanation, observations)) {
     std::vector<const Effect*> fewer = effects;
     SearchSettings stricter = settings;
     stricter.taken_back.insert(stricter.taken_back.end(), found.terms.begin(), found.terms.end());

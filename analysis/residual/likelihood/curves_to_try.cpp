@@ -46,10 +46,14 @@ std::vector<Components> course(const Observations& observations, int rotor) {
   return columns;
 }
 
+/// Whether its values are told by their ratios: a positive column, and no temperature.
+bool has_ratios(const Covariate& covariate) {
+  return !covariate.derived && !covariate.name.ends_with("_C") && covariate.value.minCoeff() > 0;
+}
+
 /// Whether a power law is what is straight.
 bool is_ratio(const Observations& observations, const Covariate& covariate) {
-  return observations.multiplicative && !covariate.derived && !covariate.name.ends_with("_C") &&
-         covariate.value.minCoeff() > 0;
+  return observations.multiplicative && has_ratios(covariate);
 }
 
 /// Whether low/x is 1 in one row of many and little in all others: a wind that was nearly still once.
@@ -72,12 +76,9 @@ std::vector<CurveShape> bends_over(const Observations& observations, const Covar
 
 /// Whether what happens at the low end is one short piece of a range: an exponential, or a threshold, in 6 to
 /// 500 s.
-bool is_wide(const Covariate& covariate, const std::vector<int>& rows) {
+bool is_wide(const Covariate& covariate, const Curve& over, const std::vector<int>& rows) {
   constexpr double kWide = 10;
-  if (covariate.derived || covariate.name.ends_with("_C")) return false;
-  const MatrixXd values = covariate.value(rows, Eigen::all);
-  return covariate.value.minCoeff() > 0 && values.maxCoeff() > kWide * values.minCoeff() &&
-         !lowest_stands_alone(covariate, rows);
+  return has_ratios(covariate) && over.high > kWide * over.low && !lowest_stands_alone(covariate, rows);
 }
 
 /// Where a curve may be seen: beyond it, in runs that are sealed, it could be anything.
@@ -146,7 +147,7 @@ class CurvesToTry {
     for (const CurveShape bend : bends_over(observations_, covariate, rows_))
       add(covariate, over, bend, 1, with_room(rooms, 1));
     for (const int count : kBends) add(covariate, over, CurveShape::kWaves, count, with_room(rooms, count));
-    if (!is_wide(covariate, rows_)) return;
+    if (!is_wide(covariate, over, rows_)) return;
     const std::vector<Room> of_logarithm = rooms_of(as_measured_along(covariate, CurveShape::kLogWaves));
     for (const int count : kBends)
       add(covariate, over, CurveShape::kLogWaves, count, with_room(of_logarithm, count));

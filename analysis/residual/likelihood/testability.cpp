@@ -176,6 +176,11 @@ std::vector<std::string> own_conditions(const Effect& effect, const Observations
   return {};
 }
 
+bool share_a_condition(const Effect& one, const Effect& other, const Observations& observations) {
+  const std::vector<std::string> own = own_conditions(one, observations);
+  return std::ranges::find_first_of(own, own_conditions(other, observations)) != own.end();
+}
+
 bool goes_by_the_law_alone(const Effect& effect, const Observations& observations) {
   if (observations.baseline_over.empty() || observations.line_of_cell) return false;
   const std::vector<std::string> by = own_conditions(effect, observations);

@@ -21,6 +21,9 @@ Testability testability(const Effect& effect, const Observations& observations);
 /// `power:COLUMN`, or the measured speed of rotors.
 std::vector<std::string> own_conditions(const Effect& effect, const Observations& observations);
 
+/// Whether one of these is a condition of both.
+bool share_a_condition(const Effect& one, const Effect& other, const Observations& observations);
+
 /// Whether that is nothing but what the law of the baseline, no cell's line, is over, be it in another unit.
 /// Each group has a law of its own, and so a bend of its own over it is as likely the law's as the effect's.
 bool goes_by_the_law_alone(const Effect& effect, const Observations& observations);

@@ -31,4 +31,8 @@ inline std::mt19937_64 random_numbers(std::uint64_t seed, std::uint64_t stream) 
   return std::mt19937_64(seed * kApart + stream);
 }
 
+inline std::mt19937_64 random_numbers(std::uint64_t seed, ScatterDraws what) {
+  return random_numbers(seed, static_cast<std::uint64_t>(what));
+}
+
 }  // namespace tunnelrig

@@ -174,10 +174,8 @@ bool Search::is_still_found(const Term& term, const JointFit& without) {
 
 void Search::forget_what_has_a_name() {
   const auto has = [&](const Term& term) {
-    const std::vector<std::string> of_term = own_conditions(*term.effect, observations_);
     return std::ranges::any_of(result_.accepted, [&](const Accepted& accepted) {
-      const std::vector<std::string> own = own_conditions(*accepted.term.effect, observations_);
-      return std::ranges::find_first_of(own, of_term) != own.end();
+      return share_a_condition(*accepted.term.effect, *term.effect, observations_);
     });
   };
   const auto is_named = [&](const std::string& name) {

@@ -47,15 +47,14 @@ std::optional<std::string> Search::only_bends(const Term& term, const NullFit& v
 const Term* Search::cancelled_by_newest(const JointFit& fit) const {
   constexpr double kSmallPart = 1.0 / 3;
   const Term& newest = fit.model.terms.back();
-  const std::vector<std::string> own = own_conditions(*newest.effect, observations_);
   const Eigen::MatrixXd predicted = predict_response(observations_, fit.model, rows_);
   const auto made_by = [&](const Term& term) { return respond(term, observations_, predicted).value[0]; };
+  const Eigen::MatrixXd of_newest = made_by(newest);
   for (const Term& other : fit.model.terms) {
-    const std::vector<std::string> of_other = own_conditions(*other.effect, observations_);
     if (&other == &newest || other.per_group || other.rotor != newest.rotor ||
-        std::ranges::find_first_of(own, of_other) == own.end())
+        !share_a_condition(*newest.effect, *other.effect, observations_))
       continue;
-    const Eigen::MatrixXd of_newest = made_by(newest), older = made_by(other);
+    const Eigen::MatrixXd older = made_by(other);
     if (rms_of(of_newest + older) < kSmallPart * std::min(rms_of(of_newest), rms_of(older))) return &other;
   }
   return nullptr;

@@ -117,13 +117,12 @@ std::vector<Curve> Search::of_each_rotor(const CurveScan& curves) {
 bool Search::begin_with_scatter_of(const CurveScan& curves) {
   const RunScatter& before = observations_.scatter;
   const bool known = before.rotors_differ();
-  const auto draw = [&](ScatterDraws what) {
-    return random_numbers(settings_.seed, static_cast<std::uint64_t>(what));
-  };
-  std::mt19937_64 for_correlation = draw(ScatterDraws::kCorrelation),
-                  for_rotors = draw(ScatterDraws::kRotors), for_runs = draw(ScatterDraws::kRuns),
-                  for_sessions = draw(ScatterDraws::kSessions),
-                  for_contrasts = draw(ScatterDraws::kContrasts);
+  const std::uint64_t seed = settings_.seed;
+  std::mt19937_64 for_correlation = random_numbers(seed, ScatterDraws::kCorrelation),
+                  for_rotors = random_numbers(seed, ScatterDraws::kRotors),
+                  for_runs = random_numbers(seed, ScatterDraws::kRuns),
+                  for_sessions = random_numbers(seed, ScatterDraws::kSessions),
+                  for_contrasts = random_numbers(seed, ScatterDraws::kContrasts);
   // While a rotor that scatters more was taken for one like the others, the best curve had a part of its
   // scatter.
   const ScatterBeside beside = scatter_beside(curves, known ? critical_ : 0, for_runs);
