@@ -144,7 +144,7 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
   if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, rows_, of_rotors, for_rotors);
   const MixedModel model(scattered, rows_);
   const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);
-  scatter.run_correlation = run_correlation(model, variances, residual, for_correlation);
+  scatter.run_correlation = run_correlation(scattered, model, variances, residual, for_correlation);
   scatter.runs = run_scatter(observations_, run_sizes(model, variances, y, columns, for_runs));
   // The best of many curves makes half of what a dozen sessions differ by, whatever that is.
   if (contrasts.size() == 0)
