@@ -47,11 +47,14 @@ void warn_of_doubts(Explanation& explanation) {
           fmt::format("{}: its {} is {:.4g} to {:.4g}, and theory says {:.4g}: something else goes with it",
                       adopted.term.label(), amplitude.name, amplitude.low, amplitude.high, *theory));
   }
-  if (explanation.noise_floor > explanation.after.held_out_high)
+  constexpr double kFarAbove =
+      3;  // of the error: its interval may reach as far, where a few rows are all of it
+  if (explanation.noise_floor >
+      std::min(explanation.after.held_out_high, kFarAbove * explanation.after.held_out_rmse))
     explanation.warnings.emplace_back(
-        "the noise floor is above all of the error's interval: the sealed blocks are calm by chance (in one "
-        "campaign of twenty-five without any fault), or the rows scatter less evenly than its variances can "
-        "follow, and it is too high");
+        "the noise floor is far above the error: the sealed blocks are calm by chance (in one campaign of "
+        "twenty-five without any fault), or the rows scatter less evenly than its variances can follow (a "
+        "stretch of gross ones, of which suspect_rows need not have any), and it is too high");
   const SealedErrors& sealed = explanation.sealed;
   const bool worse = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
   if (worse && sealed.all < std::min(sealed.curves, explanation.before.held_out_rmse)) {

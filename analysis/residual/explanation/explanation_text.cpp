@@ -56,6 +56,8 @@ std::string detectable_in_words(const Explanation& e, const std::string& unit) {
                             [](const auto& a, const auto& b) { return a.second < b.second; });
     text += fmt::format("; {} would have been seen from {:.3g}{}, {} from {:.3g}{}", least->first,
                         least->second, unit, most->first, most->second, unit);
+  } else if (e.detectable_by_effect.size() == 1) {
+    text += fmt::format("; these data test no name but {}", e.detectable_by_effect.begin()->first);
   }
   return text + "\n";
 }

@@ -175,9 +175,11 @@ class CurvesToTry {
 
   /// The rotors with room for so many waves. Where a whole one finds no row its height is anything.
   static std::vector<int> with_room(const std::vector<Room>& rooms, int waves) {
+    constexpr int kSettings = 5;  // show a straight course and a bend: without these only the bend is tried
+    const int fewest = waves == kBends[0] ? kSettings : 3 * waves;
     std::vector<int> result;
     for (const auto& [rotor, places, gap] : rooms)
-      if (3 * waves <= places && (waves < kBends[1] || gap * waves <= 2)) result.push_back(rotor);
+      if (fewest <= places && (waves < kBends[1] || gap * waves <= 2)) result.push_back(rotor);
     return result;
   }
 

@@ -97,8 +97,7 @@ struct CandidateScan::Impl {
   double most_hidden(std::size_t candidate, const State& null) const {
     double most = 0;
     for (std::size_t s = 0; s < model.strata().size(); ++s)
-      if (model.strata()[s].means() && columns.touches(candidate, s))
-        most = std::max(most, kMostHidden[null.ratio[s]]);
+      if (columns.touches(candidate, s)) most = std::max(most, kMostHidden[null.ratio[s]]);
     return most;
   }
 
@@ -133,7 +132,7 @@ struct CandidateScan::Impl {
     const Eigen::VectorXd held = ratios_at(null);
     Eigen::VectorXd result = held;
     for (std::size_t s = 0; s < model.strata().size(); ++s) {
-      if (!model.strata()[s].means() || kMostHidden[null.ratio[s]] == 0) continue;
+      if (kMostHidden[null.ratio[s]] == 0) continue;
       Eigen::VectorXd best = held;
       for (std::size_t ratio = StrataFit::lowest_tried(null.ratio[s]); ratio < null.ratio[s]; ++ratio) {
         State other = null;

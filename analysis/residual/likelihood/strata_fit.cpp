@@ -174,8 +174,9 @@ StrataFit::State StrataFit::best_without(const Data& data, Index set) const {
 
 void StrataFit::improve(const Data& data, Index set, int candidate, State& best) const {
   for (std::size_t s = 0; s < model_.strata().size(); ++s) {
-    if (!model_.strata()[s].means()) continue;
-    if (candidate >= 0 && !columns_.touches(static_cast<std::size_t>(candidate), s)) continue;
+    if (candidate < 0 ? !columns_.adopted_touch(s)
+                      : !columns_.touches(static_cast<std::size_t>(candidate), s))
+      continue;
     const std::size_t start = best.ratio[s];
     const std::size_t end = candidate < 0 ? model_.ratios() : start;
     for (std::size_t ratio = candidate < 0 ? 0 : lowest_tried(start); ratio < end; ++ratio) {

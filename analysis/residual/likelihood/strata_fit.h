@@ -36,7 +36,7 @@ class StrataFit {
   /// Session variances one stratum after the other, each at its best with the others held.
   State best_without(const Data& data, Eigen::Index set) const;
 
-  /// Tries other session variances for the runs' means, where a candidate may take a part of them away.
+  /// Tries other session variances where the adopted columns, or a candidate, may take a part of them away.
   void improve(const Data& data, Eigen::Index set, int candidate, State& best) const;
   static std::size_t lowest_tried(std::size_t ratio) { return ratio > 4 ? ratio - 4 : 0; }
 
