@@ -10,14 +10,7 @@ namespace tunnelrig {
 
 Search::Search(const Observations& observations, const std::vector<int>& rows,
                const std::vector<const Effect*>& effects, const SearchSettings& settings)
-    : whole_(observations),
-      given_(observations.without_responses_but(rows)),
-      observations_(given_),
-      rows_(rows),
-      effects_(effects),
-      settings_(settings),
-      curves_(curves_to_try(observations_, rows)),
-      y_(response_components(observations_)) {}
+    : whole_(observations), data_(observations, rows, effects, settings) {}
 
 Attribution Search::run() {
   begin();
@@ -30,15 +23,18 @@ Attribution Search::run() {
     return true;
   };
   // Once more where rotors differ: what was found while they were taken to be alike may have been scatter.
-  if (begin_again() && observations_.scatter.rotors_differ()) begin_again();
+  if (begin_again() && data_.observations().scatter.rotors_differ()) begin_again();
   add_curves(curves);
   find_confounded();
   smooth_curves();
   measure_gains();
   forget_what_has_a_name();
   result_.session_unknown = session_scatter_is_large();
-  result_.final = fit_;
-  result_.observations = std::move(observations_);
+  result_.accepted = std::move(found_.accepted);
+  result_.curves = std::move(found_.curves);
+  result_.beyond_bounds = std::move(found_.beyond_bounds);
+  result_.final = std::move(found_.fit);
+  result_.observations = data_.observations();
   result_.observations.value = whole_.value;
   result_.observations.y = whole_.y;
   result_.observations.shape = whole_.shape;
@@ -46,64 +42,41 @@ Attribution Search::run() {
 }
 
 StructureLeft Search::run_on_top_of(const Attribution& found, const JointFit& whole) {
-  make_models();
-  list_ways();
-  result_.accepted = found.accepted;
-  result_.curves = found.curves;
-  fit_ = whole;
-  read_back_terms();
+  found_ = {.fit = {}, .accepted = found.accepted, .curves = found.curves};
+  found_.set_fit(whole);
   questions_ = kDrawsOnAllRuns;  // other data sets than the search before has drawn
   StructureLeft left;
-  for (std::size_t t = 0; t < result_.accepted.size(); ++t)
+  for (std::size_t t = 0; t < found_.accepted.size(); ++t)
     if (bends_away(t)) left.bent.insert(t);
   // Of single rows the seal leaves plenty, and what `hold_out` declares is not to be seen by any search.
-  const bool few = !observations_.blocks_are_rows && observations_.held_out.empty();
-  const std::size_t before = result_.curves.size();
-  while (few && static_cast<int>(result_.curves.size()) < settings_.most_curves) {
-    const JointFit without = fit_;
+  const bool few = !data_.observations().blocks_are_rows && data_.observations().held_out.empty();
+  const std::size_t before = found_.curves.size();
+  while (few && static_cast<int>(found_.curves.size()) < data_.settings().most_curves) {
+    const JointFit without = found_.fit;
     if (!add_best_curve(scan_curves())) break;
-    for (std::size_t t = 0; t < result_.accepted.size(); ++t)
-      if (!result_.accepted[t].term.per_group && outshone_by_curve(result_.accepted[t].term))
+    for (std::size_t t = 0; t < found_.accepted.size(); ++t)
+      if (!found_.accepted[t].term.per_group && outshone_by_curve(found_.accepted[t].term))
         left.bent.insert(t);
     name_newest_curve(without);
   }
   smooth_curves(before);
-  left.curves = {result_.curves.begin() + static_cast<std::ptrdiff_t>(before), result_.curves.end()};
-  left.fit = std::move(fit_);
+  left.curves = {found_.curves.begin() + static_cast<std::ptrdiff_t>(before), found_.curves.end()};
+  left.fit = std::move(found_.fit);
   left.rounds = std::move(result_.curve_rounds);
   return left;
 }
 
+void Search::begin_with(RunScatter scatter) {
+  data_.begin_with(std::move(scatter));
+  begin();
+}
+
 void Search::begin() {
-  RunScatter scatter = std::move(observations_.scatter);
-  observations_ = given_;
-  observations_.scatter = std::move(scatter);
-  make_models();
-  list_ways();
+  found_ = {};
+  found_.fit = fit_jointly(data_.observations(), {}, data_.rows());
   result_ = {};
-  result_.baseline = fit_jointly(observations_, {}, rows_);
-  fit_ = result_.baseline;
-  result_.detectable_sigma = detectable_by_one(*mixed_, fit_.variances, settings_.alpha);
-  critical_ = 0;
-}
-
-void Search::make_models() {
-  mixed_ = std::make_unique<MixedModel>(observations_, rows_);
-  baseline_ = std::make_unique<MixedModel>(MixedModel::baseline_alone(observations_, rows_));
-}
-
-void Search::list_ways() {
-  ways_ = all_ways(effects_, observations_, rows_);
-  const OwnEvidence has_evidence(observations_, *baseline_);
-  const auto taken_back = [&](const Term& way) {
-    return std::ranges::any_of(settings_.taken_back, [&](const Term& term) {
-      return term.effect->cause() == way.effect->cause() && term.rotor == way.rotor &&
-             term.other == way.other;
-    });
-  };
-  std::erase_if(ways_, [&](const Term& way) { return taken_back(way) || !has_evidence(way); });
-  points_.clear();
-  for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
+  result_.baseline = found_.fit;
+  result_.detectable_sigma = detectable_by_one(data_.mixed(), found_.fit.variances, data_.settings().alpha);
 }
 
 OwnEvidence::OwnEvidence(const Observations& observations, const MixedModel& baseline)

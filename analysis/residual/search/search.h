@@ -5,6 +5,8 @@
 #include "analysis/residual/scatter/condition_scatter.h"
 #include "analysis/residual/search/attribution.h"
 #include "analysis/residual/search/draws.h"
+#include "analysis/residual/search/found.h"
+#include "analysis/residual/search/search_data.h"
 
 #include <map>
 #include <memory>
@@ -46,10 +48,8 @@ class Search {
 
   /// The model without any effect; what was found before is forgotten.
   void begin();
-  /// Those of `observations_`.
-  void make_models();
-  /// The effects in all their ways, but for those taken back and those that the data cannot show.
-  void list_ways();
+  /// With this scatter.
+  void begin_with(RunScatter scatter);
 
   // named effects: search_effects.cpp
   void add_effects();
@@ -135,11 +135,10 @@ class Search {
   std::pair<double, double> sum_of_squares(const Observations& observations, const JointFit& fit,
                                            const NullFit& variances) const;
   /// A joint fit with one term more; theory's coefficient where the data do not speak against it.
-  JointFit fit_with(Term term, double amplitude) const { return fit_with(fit_, term, amplitude); }
+  JointFit fit_with(Term term, double amplitude) const { return fit_with(found_.fit, term, amplitude); }
   JointFit fit_with(const JointFit& base, Term term, double amplitude) const;
   /// p of a likelihood ratio of one parameter of a fitted model: few rows are no large sample.
   double ratio_p(double ratio, const JointFit& fit) const;
-  void read_back_terms();
   /// With a new effect in, an older one may be explained better by another, or not be beyond chance any more.
   void ask_older_again();
   /// Whether accepted effect t gave way: to another, or to nothing where neither is beyond chance.
@@ -147,17 +146,14 @@ class Search {
   /// Or by another form of itself, which was chosen while the newer was not known: the likelier, where each
   /// parameter that a form has more must be worth a ratio test.
   bool change_a_form();
-  /// Of `accepted`, whose term is the model's last.
-  void make_newest(std::size_t t);
   void put_in_place(std::size_t t, const JointFit& tried, double p);
   double evidence_of(const Scan& scan, const Term& term) const;
-  JointFit fit_without(std::size_t t) const { return fit_without(t, observations_); }
+  JointFit fit_without(std::size_t t) const { return fit_without(t, data_.observations()); }
   JointFit fit_without(std::size_t t, const Observations& observations) const;
   /// What each effect must be to reach the critical evidence in four of five data sets drawn from the null
   /// model (the typical one of its forms and shapes): of what varies from session to session far more is
   /// needed than of what varies from run to run.
   void set_detectable(const Scan& scan);
-  double rms_of(const Eigen::MatrixXd& column) const;
   /// For the data that are drawn once more: scatter may go with anything, but what a candidate explains of
   /// the runs is none. Nothing of few runs, whose signs make too few data sets.
   std::vector<Eigen::MatrixXd> sizes_beside(const JointFit& fit, const Candidate& candidate,
@@ -216,8 +212,6 @@ class Search {
   /// Whether what it is over is all but told by what a found one is over: beside each other both could have
   /// any size.
   bool go_together(const Curve& found, const Curve& curve) const;
-  /// Takes accepted effect t out; `without` is the fit without it.
-  void drop(std::size_t t, const JointFit& without);
   /// The same, and gives the newest curve the straight part that no name takes any more.
   void give_way_to_curve(std::size_t t, const JointFit& without);
   /// Of what an effect makes of its conditions, `made` per unit of its amplitude on top of `predicted`, the
@@ -244,7 +238,7 @@ class Search {
   /// well. `without`: the fit without the curve.
   void name_newest_curve(const JointFit& without);
   CrossValidation unseen(const JointFit& fit, const NullFit& variances) const {
-    return unseen(observations_, fit, variances);
+    return unseen(data_.observations(), fit, variances);
   }
   CrossValidation unseen(const Observations& observations, const JointFit& fit,
                          const NullFit& variances) const;
@@ -254,19 +248,9 @@ class Search {
   CrossValidation unseen_with(const std::vector<Components>& columns, const NullFit& variances) const;
 
   const Observations& whole_;
-  const Observations given_;   // nothing is searched, or judged, by a response outside of `rows_`
-  Observations observations_;  // a group's own amplitudes become a part of its baseline
-  const std::vector<int>& rows_;
-  const std::vector<const Effect*>& effects_;
-  const SearchSettings& settings_;
-  std::unique_ptr<MixedModel> mixed_, baseline_;  // baseline_: of runs that are independent
-  std::vector<Term> ways_;
-  std::vector<Curve> curves_;
-  Components y_;
-  std::map<std::string, std::size_t> points_;  // change-points tried of an effect and rotor
-  JointFit fit_;
-  Attribution result_;
-  double critical_ = 0;
+  SearchData data_;
+  Found found_;
+  Attribution result_;           // but for what `found_` has
   std::uint64_t questions_ = 0;  // that data sets were drawn for
 };
 

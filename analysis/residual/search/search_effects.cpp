@@ -48,7 +48,7 @@ bool refuses_theory(const Term& way, const CandidateFit& fit) {
 void Search::add_effects() {
   bool wider = true;
   while (wider) {
-    while (static_cast<int>(result_.accepted.size()) < settings_.most_effects && add_best_effect()) {
+    while (static_cast<int>(found_.accepted.size()) < data_.settings().most_effects && add_best_effect()) {
       ask_older_again();
       while (change_a_form()) {
       }
@@ -69,7 +69,7 @@ bool Search::already_in(const Term& way, const MeanModel& model) const {
   // What all do beside what single ones do is one more, as long as one has none of its own.
   const auto of_single =
       std::ranges::count_if(model.terms, [&](const Term& term) { return is_of(term) && term.rotor >= 0; });
-  return of_own_rotor > 0 || (way.rotor < 0 && of_single >= observations_.channels());
+  return of_own_rotor > 0 || (way.rotor < 0 && of_single >= data_.observations().channels());
 }
 
 Search::Scan Search::scan_effects(const JointFit& base) const {
@@ -80,12 +80,12 @@ Search::Scan Search::scan_effects(const JointFit& base) const {
 
 Search::Scan Search::list_effects(const JointFit& base) const {
   Scan scan;
-  const Eigen::MatrixXd predicted = predict_response(observations_, base.model, rows_);
-  for (const Term& way : ways_) {
+  const Eigen::MatrixXd predicted = predict_response(data_.observations(), base.model, data_.rows());
+  for (const Term& way : data_.ways()) {
     if (already_in(way, base.model) || was_beyond_bounds(way)) continue;
     Candidate candidate = candidate_of(way, predicted);
     const Components& column = candidate.columns[0];
-    if (is_work_of_a_curve(way, column[0], predicted) || !mixed_->sees(column)) continue;
+    if (is_work_of_a_curve(way, column[0], predicted) || !data_.mixed().sees(column)) continue;
     scan.ways.push_back(way);
     scan.candidates.push_back(std::move(candidate));
   }
@@ -98,37 +98,38 @@ std::optional<BeyondBounds> Search::beyond_bounds(Term way, double start) const 
   Effect freed = *way.effect;
   freed.parameters[0].lower -= kWidths * (bounded.upper - bounded.lower);
   freed.parameters[0].upper += kWidths * (bounded.upper - bounded.lower);
-  MeanModel model = fit_.model;
+  MeanModel model = found_.fit.model;
   model.terms.push_back(way);
   model.terms.back().effect = &freed;
   model.terms.back().parameters[0] = start;
-  const double amplitude = fit_jointly(observations_, model, rows_).model.terms.back().parameters[0];
+  const double amplitude =
+      fit_jointly(data_.observations(), model, data_.rows()).model.terms.back().parameters[0];
   if (!(amplitude < bounded.lower || amplitude > bounded.upper)) return std::nullopt;
   return BeyondBounds{std::move(way), amplitude};
 }
 
 bool Search::was_beyond_bounds(const Term& way) const {
-  return std::ranges::any_of(result_.beyond_bounds, [&](const BeyondBounds& beyond) {
+  return std::ranges::any_of(found_.beyond_bounds, [&](const BeyondBounds& beyond) {
     return beyond.term.effect->name == way.effect->name &&
-           std::ranges::any_of(result_.curves, [&](const FoundCurve& found) {
-             return is_over(found.curve, own_conditions(*way.effect, observations_));
+           std::ranges::any_of(found_.curves, [&](const FoundCurve& found) {
+             return is_over(found.curve, own_conditions(*way.effect, data_.observations()));
            });
   });
 }
 
 Candidate Search::candidate_of(const Term& way, const Eigen::MatrixXd& predicted) const {
   const EffectParameter& amplitude = way.effect->parameters[0];
-  const std::size_t points = points_.at(way.effect->name + std::to_string(way.rotor));
-  return {.columns = {respond(way, observations_, predicted).derivative[0]},
+  const std::size_t points = data_.ways_like(way);
+  return {.columns = {respond(way, data_.observations(), predicted).derivative[0]},
           .sign = amplitude.lower >= 0   ? 1
                   : amplitude.upper <= 0 ? -1
                                          : 0,
-          .weight = prior_weight(way, observations_, points)};
+          .weight = prior_weight(way, data_.observations(), points)};
 }
 
 void Search::rank(const JointFit& base, Scan& scan) const {
-  scan.scan = std::make_unique<CandidateScan>(*mixed_, base.linear.columns, scan.candidates);
-  scan.fits = scan.scan->fit(difference(y_, base.linear.offset));
+  scan.scan = std::make_unique<CandidateScan>(data_.mixed(), base.linear.columns, scan.candidates);
+  scan.fits = scan.scan->fit(difference(data_.y(), base.linear.offset));
   for (std::size_t i = 0; i < scan.ways.size(); ++i)
     if (refuses_theory(scan.ways[i], scan.fits[i])) scan.fits[i].evidence -= std::log10(kKnownPhysicsWeight);
   scan.order.resize(scan.fits.size());
@@ -138,19 +139,20 @@ void Search::rank(const JointFit& base, Scan& scan) const {
 }
 
 bool Search::add_best_effect() {
-  settings_.progress(fmt::format("looking for effect {}", result_.accepted.size() + 1));
-  const Scan scan = scan_effects_and_groups(fit_);
+  data_.settings().progress(fmt::format("looking for effect {}", found_.accepted.size() + 1));
+  const Scan scan = scan_effects_and_groups(found_.fit);
   Round round;
   if (scan.order.empty()) return false;
-  NullMaxima maxima = maxima_of(fit_, scan, Draws::kEffects);
+  NullMaxima maxima = maxima_of(found_.fit, scan, Draws::kEffects);
   const double p = maxima.p(scan.fits[scan.order[0]].evidence);
-  if (p <= settings_.alpha || critical_ == 0) critical_ = maxima.critical();
+  if (p <= data_.settings().alpha || found_.critical == 0) found_.critical = maxima.critical();
   round.observed = scan.fits[scan.order[0]].evidence;
-  round.critical = p <= settings_.alpha ? critical_ : critical_of(maxima.values(), settings_.alpha);
+  round.critical =
+      p <= data_.settings().alpha ? found_.critical : critical_of(maxima.values(), data_.settings().alpha);
   round.ranking = ranking(scan, maxima);
   round.null_maxima = maxima.values();
   if (result_.rounds.empty()) set_detectable(scan);
-  const bool added = p <= settings_.alpha && accept_first_sound(scan, maxima, round);
+  const bool added = p <= data_.settings().alpha && accept_first_sound(scan, maxima, round);
   if (!added && round.outcome.empty())
     round.outcome = fmt::format("nothing: p = {:.3g} for {}", p, scan.ways[scan.order[0]].label());
   result_.rounds.push_back(std::move(round));
@@ -158,7 +160,7 @@ bool Search::add_best_effect() {
 }
 
 NullMaxima Search::maxima_of(const JointFit& fit, const Scan& scan, Draws what) {
-  return maxima_of(fit, scan, what, settings_);
+  return maxima_of(fit, scan, what, data_.settings());
 }
 
 NullMaxima Search::maxima_of(const JointFit& fit, const Scan& scan, Draws what,
@@ -187,11 +189,11 @@ std::vector<Ranked> Search::ranking(const Scan& scan, NullMaxima& maxima) const 
 bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& round) {
   std::vector<const Effect*> tried;
   std::optional<BeyondBounds> beyond;  // of the first, and none about as good is accepted
-  const std::size_t had = result_.accepted.size();
+  const std::size_t had = found_.accepted.size();
   for (const std::size_t best : scan.order) {
-    if (scan.fits[best].evidence < critical_) break;
+    if (scan.fits[best].evidence < found_.critical) break;
     if (beyond && scan.fits[best].evidence < scan.fits[scan.order[0]].evidence - kClearDecades)
-      result_.beyond_bounds.push_back(*std::exchange(beyond, std::nullopt));
+      found_.beyond_bounds.push_back(*std::exchange(beyond, std::nullopt));
     const bool together = scan.others.contains(best);
     if (!together) {
       if (std::ranges::find(tried, scan.ways[best].effect) != tried.end()) continue;
@@ -201,12 +203,12 @@ bool Search::accept_first_sound(const Scan& scan, NullMaxima& maxima, Round& rou
                    : accept(scan, best, maxima, round, beyond)))
       continue;
     std::vector<std::string> labels;
-    for (std::size_t k = had; k < result_.accepted.size(); ++k)
-      labels.push_back(result_.accepted[k].term.label());
+    for (std::size_t k = had; k < found_.accepted.size(); ++k)
+      labels.push_back(found_.accepted[k].term.label());
     round.outcome += fmt::format("accepted {}", fmt::join(labels, " and "));
     return true;
   }
-  if (beyond) result_.beyond_bounds.push_back(*beyond);
+  if (beyond) found_.beyond_bounds.push_back(*beyond);
   return false;
 }
 
@@ -223,7 +225,7 @@ bool Search::accept(const Scan& scan, std::size_t best, NullMaxima& maxima, Roun
   JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
   const CrossValidation after = unseen(fit, fit.variances);
   // Both are scored by the variances of the larger model, so that the difference is the mean's.
-  if (const auto reason = why_not(fit, after, compare(unseen(fit_, fit.variances), after))) {
+  if (const auto reason = why_not(fit, after, compare(unseen(found_.fit, fit.variances), after))) {
     round.outcome += *reason + "; ";
     if (scan.ways[best].per_group && accept_in_groups(scan.ways[best], maxima.p(scan.fits[best].evidence)))
       return true;
@@ -232,38 +234,38 @@ bool Search::accept(const Scan& scan, std::size_t best, NullMaxima& maxima, Roun
       beyond = beyond_bounds(scan.ways[i], scan.fits[i].amplitude(0));
     return false;
   }
-  result_.accepted.push_back(
-      {.term = fit.model.terms.back(), .p = maxima.p(scan.fits[i].evidence), .confounded = {}});
-  fit_ = at_best_run(std::move(fit), 1);
-  read_back_terms();
-  let_groups_differ(result_.accepted.size() - 1, true);
+  Accepted newest{.term = fit.model.terms.back(), .p = maxima.p(scan.fits[i].evidence), .confounded = {}};
+  found_.accept(std::move(newest), at_best_run(std::move(fit), 1));
+  let_groups_differ(found_.accepted.size() - 1, true);
   return true;
 }
 
 void Search::measure_gains() {
-  const double with = unseen(fit_, fit_.variances).rmse();
-  for (std::size_t t = 0; t < result_.accepted.size(); ++t) {
-    Observations others =
-        result_.accepted[t].term.per_group ? without_own(observations_, fit_.model, t) : observations_;
-    const JointFit without = fit_in_turns(others, fit_.model.without_term(t), rows_);
-    result_.accepted[t].gain = unseen(others, without, without.variances).rmse() - with;
+  const double with = unseen(found_.fit, found_.fit.variances).rmse();
+  for (std::size_t t = 0; t < found_.accepted.size(); ++t) {
+    Observations others = found_.accepted[t].term.per_group
+                              ? without_own(data_.observations(), found_.fit.model, t)
+                              : data_.observations();
+    const JointFit without = fit_in_turns(others, found_.fit.model.without_term(t), data_.rows());
+    found_.accepted[t].gain = unseen(others, without, without.variances).rmse() - with;
   }
 }
 
 CrossValidation Search::unseen(const Observations& observations, const JointFit& fit,
                                const NullFit& variances) const {
-  return cross_validate(observations, difference(y_, fit.linear.offset), fit.linear.columns, variances,
-                        rows_);
+  return cross_validate(observations, difference(data_.y(), fit.linear.offset), fit.linear.columns, variances,
+                        data_.rows());
 }
 
 std::vector<Components> Search::columns_with(const std::vector<Components>& more) const {
-  std::vector<Components> columns = fit_.linear.columns;
+  std::vector<Components> columns = found_.fit.linear.columns;
   columns.insert(columns.end(), more.begin(), more.end());
   return columns;
 }
 
 CrossValidation Search::unseen_with(const std::vector<Components>& columns, const NullFit& variances) const {
-  return cross_validate(observations_, difference(y_, fit_.linear.offset), columns, variances, rows_);
+  return cross_validate(data_.observations(), difference(data_.y(), found_.fit.linear.offset), columns,
+                        variances, data_.rows());
 }
 
 std::optional<std::string> Search::why_not(const JointFit& fit, const CrossValidation& after,
@@ -294,12 +296,12 @@ JointFit Search::fit_with(const JointFit& base, Term term, double amplitude) con
   term.parameters[0] = std::clamp(amplitude, parameter.lower, parameter.upper);
   MeanModel model = base.model;
   model.terms.push_back(term);
-  JointFit free = fit_jointly(observations_, model, rows_);
+  JointFit free = fit_jointly(data_.observations(), model, data_.rows());
   if (!parameter.theory) return free;
   model = free.model;
   model.terms.back().at_theory = true;
   model.terms.back().parameters[0] = *parameter.theory;
-  JointFit fixed = fit_jointly(observations_, model, rows_);
+  JointFit fixed = fit_jointly(data_.observations(), model, data_.rows());
   const double ratio = std::max(0.0, free.variances.log_likelihood - fixed.variances.log_likelihood);
   const bool allowed = ratio_p(ratio, free) > kTheoryRefused;
   return allowed || term.effect->theory_only ? fixed : free;
@@ -307,13 +309,9 @@ JointFit Search::fit_with(const JointFit& base, Term term, double amplitude) con
 
 double Search::ratio_p(double ratio, const JointFit& fit) const {
   Index dof = -static_cast<Index>(fit.linear.columns.size());
-  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) dof += mixed_->dof(s);
+  for (std::size_t s = 0; s < data_.mixed().strata().size(); ++s) dof += data_.mixed().dof(s);
   const double n = static_cast<double>(std::max<Index>(dof, 1));
   return f_upper_p(std::expm1(2 * ratio / (n + 1)) * n, 1, n);
-}
-
-void Search::read_back_terms() {
-  for (std::size_t t = 0; t < result_.accepted.size(); ++t) result_.accepted[t].term = fit_.model.terms[t];
 }
 
 void Search::set_detectable(const Scan& scan) {
@@ -323,7 +321,8 @@ void Search::set_detectable(const Scan& scan) {
     const bool alike = way.rotor < 0 || way.effect->scope == EffectScope::kPair;
     if (!alike || way.per_group || scan.others.contains(i)) continue;
     const double z = std::sqrt(2 * scan.fits[i].likelihood_ratio);
-    const double size = std::abs(scan.fits[i].amplitude(0)) * rms_of(scan.candidates[i].columns[0][0]);
+    const double size =
+        std::abs(scan.fits[i].amplitude(0)) * rms_beside_baseline(data_, scan.candidates[i].columns[0][0]);
     if (z > 0 && size > 0) errors[way.effect->name].emplace_back(size / z, i);
   }
   if (errors.empty()) return;
@@ -335,37 +334,20 @@ void Search::set_detectable(const Scan& scan) {
     typical.push_back(scan.candidates[ways[ways.size() / 2].second]);
   }
   constexpr std::size_t kDataSets = 100, kFourInFive = 80;
-  std::mt19937_64 random(settings_.seed);
+  std::mt19937_64 random(data_.settings().seed);
   const Eigen::MatrixXd amplitude =
-      CandidateScan(*mixed_, {}, typical).critical_amplitudes(fit_.variances, critical_, kDataSets, random);
+      CandidateScan(data_.mixed(), {}, typical)
+          .critical_amplitudes(found_.fit.variances, found_.critical, kDataSets, random);
   double largest = 0;
   for (std::size_t i = 0; i < names.size(); ++i) {
     Eigen::VectorXd own = amplitude.col(static_cast<Index>(i));
     std::nth_element(own.begin(), own.begin() + kFourInFive - 1, own.end());
-    const double needed = own(kFourInFive - 1) * rms_of(typical[i].columns[0][0]);
+    const double needed = own(kFourInFive - 1) * rms_beside_baseline(data_, typical[i].columns[0][0]);
     if (!std::isfinite(needed)) continue;
     result_.detectable_by_effect[names[i]] = needed;
     largest = std::max(largest, needed);
   }
   if (largest > 0) result_.detectable_sigma = largest;
-}
-
-double Search::rms_of(const Eigen::MatrixXd& column) const {
-  constexpr double kRounding = 1e-14;  // of the squares, as MixedModel::sees
-  Components components(1 + observations_.shape.size(),
-                        Eigen::MatrixXd::Zero(observations_.rows(), observations_.channels()));
-  components[0] = column;
-  double whole = 0, squares = 0;
-  Index count = 0;
-  for (std::size_t s = 0; s < baseline_->strata().size(); ++s) {
-    if (!baseline_->strata()[s].means()) continue;
-    Stacked stacked = baseline_->stack(s, {&components});
-    whole += stacked.squaredNorm();
-    baseline_->project(s, 0, stacked);
-    squares += stacked.squaredNorm();
-    count += stacked.size();
-  }
-  return squares > kRounding * whole ? std::sqrt(squares / static_cast<double>(count)) : 0;
 }
 
 }  // namespace tunnelrig

@@ -14,8 +14,8 @@ namespace tunnelrig {
 using Eigen::Index;
 
 void Search::find_confounded() {
-  for (std::size_t t = 0; t < result_.accepted.size(); ++t) {
-    Accepted& accepted = result_.accepted[t];
+  for (std::size_t t = 0; t < found_.accepted.size(); ++t) {
+    Accepted& accepted = found_.accepted[t];
     if (accepted.term.per_group) {
       accepted.confounded = rivals_in_groups(accepted);
       continue;
@@ -28,18 +28,19 @@ void Search::find_confounded() {
 std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& without,
                                    const Scan& scan) const {
   std::vector<Ranked> result;
-  const Components y = difference(y_, without.linear.offset);
-  const Eigen::MatrixXd predicted = predict_response(observations_, without.model, rows_);
+  const Components y = difference(data_.y(), without.linear.offset);
+  const Eigen::MatrixXd predicted = predict_response(data_.observations(), without.model, data_.rows());
   const auto validate = [&](const Term& way, const Candidate& candidate) {
     std::vector<Components> columns = without.linear.columns;
     if (way.effect->theory_only) {  // with another amplitude it would be another effect
       Term at_theory = way;
       at_theory.parameters[0] = *way.effect->theory();
-      return cross_validate(observations_, difference(y, respond(at_theory, observations_, predicted).value),
-                            columns, fit_.variances, rows_);
+      return cross_validate(data_.observations(),
+                            difference(y, respond(at_theory, data_.observations(), predicted).value), columns,
+                            found_.fit.variances, data_.rows());
     }
     columns.push_back(candidate.columns[0]);
-    return cross_validate(observations_, y, columns, fit_.variances, rows_);
+    return cross_validate(data_.observations(), y, columns, found_.fit.variances, data_.rows());
   };
   std::optional<CrossValidation> own;
   for (const std::size_t i : scan.order)
@@ -49,7 +50,7 @@ std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& wit
   if (!own) return result;
   std::vector<std::string> done = {accepted.term.effect->cause()};
   for (const std::size_t i : scan.order) {
-    if (scan.fits[i].evidence < critical_) break;
+    if (scan.fits[i].evidence < found_.critical) break;
     const std::string cause = scan.ways[i].effect->cause();
     if (std::count(done.begin(), done.end(), cause) >= 3) continue;  // three ways of each are tried
     done.push_back(cause);
@@ -64,7 +65,7 @@ std::vector<Ranked> Search::rivals(const Accepted& accepted, const JointFit& wit
     MeanModel instead = without.model;
     instead.terms.push_back(term);
     instead.terms.back().at_theory = term.effect->theory_only;
-    const JointFit fit = fit_jointly(observations_, instead, rows_);
+    const JointFit fit = fit_jointly(data_.observations(), instead, data_.rows());
     const auto& terms = fit.model.terms;
     if (std::any_of(terms.begin(), std::prev(terms.end()),
                     [&](const Term& each) { return at_bound(fit, each); }))
@@ -82,46 +83,48 @@ bool Search::within_bounds(const Scan& scan, std::size_t i) {
 std::vector<Ranked> Search::rivals_in_groups(const Accepted& accepted) const {
   std::vector<Ranked> result;
   std::size_t t = 0;
-  while (!fit_.model.terms[t].same_way(accepted.term)) ++t;
-  const Index own_place = place_among_own(fit_.model, t);
-  const Index place = observations_.first_own_slope() + own_place;
-  const Observations fewer = without_own(observations_, fit_.model, t);
+  while (!found_.fit.model.terms[t].same_way(accepted.term)) ++t;
+  const Index own_place = place_among_own(found_.fit.model, t);
+  const Index place = data_.observations().first_own_slope() + own_place;
+  const Observations fewer = without_own(data_.observations(), found_.fit.model, t);
   const JointFit without = fit_without(t, fewer);
-  const Eigen::MatrixXd predicted = predict_response(observations_, {}, rows_);
-  const CrossValidation own = unseen(fit_, fit_.variances);
-  for (const Term& way : ways_) {
+  const Eigen::MatrixXd predicted = predict_response(data_.observations(), {}, data_.rows());
+  const CrossValidation own = unseen(found_.fit, found_.fit.variances);
+  for (const Term& way : data_.ways()) {
     const std::string cause = way.effect->cause();
-    const bool taken = already_in(way, fit_.model) || cause == accepted.term.effect->cause() ||
+    const bool taken = already_in(way, found_.fit.model) || cause == accepted.term.effect->cause() ||
                        std::any_of(result.begin(), result.end(),
                                    [&](const Ranked& r) { return r.term.effect->cause() == cause; });
     if (taken) continue;
-    Observations other = observations_;
-    other.slopes.col(place) = respond(way, observations_, predicted).derivative[0][0];
+    Observations other = data_.observations();
+    other.slopes.col(place) = respond(way, data_.observations(), predicted).derivative[0][0];
     other.beyond.col(own_place).setZero();
-    MeanModel instead = fit_.model;
+    MeanModel instead = found_.fit.model;
     instead.terms[t] = way;
     instead.terms[t].per_group = true;
-    const JointFit fit = fit_in_turns(other, instead, rows_);
-    const CrossValidation with_other = unseen(other, fit, fit_.variances);
+    const JointFit fit = fit_in_turns(other, instead, data_.rows());
+    const CrossValidation with_other = unseen(other, fit, found_.fit.variances);
     if (compare(with_other, own).told_apart()) continue;
     const double evidence =
         -std::log10(std::max(p_of_groups(fewer, without, other, fit), 1e-300)) + std::log10(kWeightInGroups);
-    if (evidence >= critical_ && fit.at_bound.empty() && groups_within_bounds(other, fit, t))
+    if (evidence >= found_.critical && fit.at_bound.empty() && groups_within_bounds(other, fit, t))
       result.push_back({.term = way});
   }
   return result;
 }
 
 void Search::name_newest_curve(const JointFit& without) {
-  FoundCurve newest = std::move(result_.curves.back());
-  result_.curves.pop_back();
-  const JointFit with_curve = std::exchange(fit_, without);
-  const Scan scan = scan_effects(fit_);
-  const double critical = scan.order.empty() ? 0 : maxima_of(fit_, scan, Draws::kRivals).critical();
+  const Found with_it = found_;
+  FoundCurve newest = with_it.curves.back();
+  const JointFit& with_curve = with_it.fit;
+  found_.curves.pop_back();
+  found_.fit = without;
+  const Scan scan = scan_effects(found_.fit);
+  const double critical = scan.order.empty() ? 0 : maxima_of(found_.fit, scan, Draws::kRivals).critical();
   const CrossValidation of_curve = unseen(with_curve, with_curve.variances);
   const auto left_of_curve = [&](const JointFit& beside) {
-    const CandidateScan alone(*mixed_, beside.linear.columns, {as_candidate(newest.curve)});
-    return alone.fit(difference(y_, beside.linear.offset))[0].likelihood_ratio;
+    const CandidateScan alone(data_.mixed(), beside.linear.columns, {as_candidate(newest.curve)});
+    return alone.fit(difference(data_.y(), beside.linear.offset))[0].likelihood_ratio;
   };
   std::set<std::string> tried;
   for (const std::size_t i : scan.order) {
@@ -129,15 +132,15 @@ void Search::name_newest_curve(const JointFit& without) {
     if (!tried.insert(scan.ways[i].effect->cause()).second) continue;
     const JointFit fit = fit_with(scan.ways[i], scan.fits[i].amplitude(0));
     const CrossValidation after = unseen(fit, fit.variances);
-    if (why_not(fit, after, compare(unseen(fit_, fit.variances), after)) ||
+    if (why_not(fit, after, compare(unseen(found_.fit, fit.variances), after)) ||
         compare(unseen(fit, with_curve.variances), of_curve).told_apart())
       continue;
     if (2 * left_of_curve(fit) > left_of_curve(without))
       continue;  // a small one of its own, beside the curve
     newest.could_be.push_back(fit.model.terms.back());
   }
-  fit_ = with_curve;
-  result_.curves.push_back(std::move(newest));
+  found_ = with_it;
+  found_.curves.back() = std::move(newest);
 }
 
 }  // namespace tunnelrig

@@ -40,11 +40,11 @@ std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Can
                                                   const CandidateFit& found) const {
   constexpr Eigen::Index kFewest = 20;
   constexpr std::size_t kMostFar = 3;
-  if (mixed_->dof(0) < kFewest) return {};
-  const Components y = difference(y_, fit.linear.offset);
+  if (data_.mixed().dof(0) < kFewest) return {};
+  const Components y = difference(data_.y(), fit.linear.offset);
   const auto sizes = [&](const std::vector<Eigen::Index>& as_they_are) {
-    return mixed_->sizes_left(fit.variances.ratio, fit.variances.sigma, y, candidate.columns, found.amplitude,
-                              as_they_are);
+    return data_.mixed().sizes_left(fit.variances.ratio, fit.variances.sigma, y, candidate.columns,
+                                    found.amplitude, as_they_are);
   };
   auto result = sizes({});
   // Where a condition has one value far out, a curve that is only nearly right is far off without that run.
@@ -55,33 +55,35 @@ std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Can
 bool Search::is_found_without(const std::vector<Eigen::Index>& places, const JointFit& fit,
                               const Candidate& candidate, const CandidateFit& found) const {
   constexpr double kMost = 0.7;
-  const Eigen::Index channels = y_[0].cols();
+  const Eigen::Index channels = data_.y()[0].cols();
   Components nothing;
-  for (const Eigen::MatrixXd& component : y_)
+  for (const Eigen::MatrixXd& component : data_.y())
     nothing.push_back(Eigen::MatrixXd::Zero(component.rows(), component.cols()));
   std::vector<Components> columns = fit.linear.columns;
   for (const Eigen::Index place : places)
     for (Eigen::Index channel = 0; channel < channels; ++channel) {
       columns.push_back(nothing);
-      columns.back()[0](rows_[static_cast<std::size_t>(place)], channel) = 1;
+      columns.back()[0](data_.rows()[static_cast<std::size_t>(place)], channel) = 1;
     }
-  const CandidateScan scan(*mixed_, columns, {candidate});
-  return scan.fit(difference(y_, fit.linear.offset))[0].evidence > kMost * found.evidence;
+  const CandidateScan scan(data_.mixed(), columns, {candidate});
+  return scan.fit(difference(data_.y(), fit.linear.offset))[0].evidence > kMost * found.evidence;
 }
 
 Search::ScatterBeside Search::scatter_beside(const CurveScan& curves, double least_evidence,
                                              std::mt19937_64& random) const {
-  const Components y = difference(y_, fit_.linear.offset);
-  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+  const Components y = difference(data_.y(), found_.fit.linear.offset);
+  const Eigen::MatrixXd predicted = predict_response(data_.observations(), found_.fit.model, data_.rows());
   const auto beside = [&](const std::vector<Components>& columns) {
-    return ScatterBeside{columns, condition_scatter(observations_, rows_, y, columns, predicted, random)};
+    return ScatterBeside{
+        columns, condition_scatter(data_.observations(), data_.rows(), y, columns, predicted, random)};
   };
   // Less ½ ln n for each column and condition.
   const auto likelihood = [&](const ScatterBeside& of) {
     const auto parameters = static_cast<double>(of.columns.size() + of.scatter.by_condition.names.size());
-    return of.scatter.variances.log_likelihood - parameters * std::log(static_cast<double>(rows_.size())) / 2;
+    return of.scatter.variances.log_likelihood -
+           parameters * std::log(static_cast<double>(data_.rows().size())) / 2;
   };
-  ScatterBeside alone = beside(fit_.linear.columns);
+  ScatterBeside alone = beside(found_.fit.linear.columns);
   if (curves.tried.empty() || curves.scan.fits[curves.scan.order[0]].evidence < least_evidence) return alone;
   ScatterBeside with = beside(columns_with(curves.tried[curves.scan.order[0]].columns));
   // A curve may be the scatter of a few runs far out on a condition, and scatter a curve.
@@ -115,9 +117,9 @@ std::vector<Curve> Search::of_each_rotor(const CurveScan& curves) {
 }
 
 bool Search::begin_with_scatter_of(const CurveScan& curves) {
-  const RunScatter& before = observations_.scatter;
+  const RunScatter& before = data_.observations().scatter;
   const bool known = before.rotors_differ();
-  const std::uint64_t seed = settings_.seed;
+  const std::uint64_t seed = data_.settings().seed;
   std::mt19937_64 for_correlation = random_numbers(seed, ScatterDraws::kCorrelation),
                   for_rotors = random_numbers(seed, ScatterDraws::kRotors),
                   for_runs = random_numbers(seed, ScatterDraws::kRuns),
@@ -125,13 +127,13 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
                   for_contrasts = random_numbers(seed, ScatterDraws::kContrasts);
   // While a rotor that scatters more was taken for one like the others, the best curve had a part of its
   // scatter.
-  const ScatterBeside beside = scatter_beside(curves, known ? critical_ : 0, for_runs);
+  const ScatterBeside beside = scatter_beside(curves, known ? found_.critical : 0, for_runs);
   const std::vector<Components>& columns = beside.columns;
-  const Components y = difference(y_, fit_.linear.offset);
-  Observations scattered = observations_;
+  const Components y = difference(data_.y(), found_.fit.linear.offset);
+  Observations scattered = data_.observations();
   RunScatter& scatter = scattered.scatter = {.by_condition = beside.scatter.by_condition};
   const auto left_beside = [&](const std::vector<Components>& of) {
-    return without(y, of, fit_amplitudes(scattered, y, of, beside.scatter.variances, rows_).amplitude);
+    return without(y, of, fit_amplitudes(scattered, y, of, beside.scatter.variances, data_.rows()).amplitude);
   };
   const Components residual = left_beside(columns);
   // What a condition does to single rotors, or to them in pairs, is no scatter.
@@ -140,15 +142,16 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
     with_each_rotor.insert(with_each_rotor.end(), curve.columns.begin(), curve.columns.end());
   const Components of_rotors = left_beside(with_each_rotor);
   // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter.
-  const Eigen::VectorXd contrasts = contrast_scatter(scattered, rows_, of_rotors, for_contrasts);
-  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, rows_, of_rotors, for_rotors);
-  const MixedModel model(scattered, rows_);
+  const Eigen::VectorXd contrasts = contrast_scatter(scattered, data_.rows(), of_rotors, for_contrasts);
+  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, data_.rows(), of_rotors, for_rotors);
+  const MixedModel model(scattered, data_.rows());
   const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);
   scatter.run_correlation = run_correlation(model, variances, residual, for_correlation);
-  scatter.runs = run_scatter(observations_, run_sizes(model, variances, y, columns, for_runs));
+  scatter.runs = run_scatter(data_.observations(), run_sizes(model, variances, y, columns, for_runs));
   // The best of many curves makes half of what a dozen sessions differ by, whatever that is.
   if (contrasts.size() == 0)
-    scatter.sessions = rotor_sessions(scattered, rows_, left_beside(fit_.linear.columns), for_sessions);
+    scatter.sessions =
+        rotor_sessions(scattered, data_.rows(), left_beside(found_.fit.linear.columns), for_sessions);
   scatter.contrasts = contrasts;  // after what takes the differences for one stratum
   if (are_alike(scatter.rotors, before.rotors) && are_alike(contrasts, before.contrasts) &&
       scatter.sessions.rotors == before.sessions.rotors &&
@@ -156,8 +159,7 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
       before.by_condition.names == scatter.by_condition.names &&
       (known || scatter.run_correlation == before.run_correlation))
     return false;
-  observations_.scatter = scatter;
-  begin();
+  begin_with(std::move(scatter));
   return true;
 }
 

@@ -35,9 +35,9 @@ void Search::add_pairs_of_steps(Scan& scan) const {
   constexpr double kWeight = 1. / 6;  // six pairs for four rotors, and rarer than one
   constexpr double kHiding = 1;  // σ_session²/σ_run² of what rotors differ by; below, no steps hide in it
   bool hiding = false;
-  for (std::size_t s = 0; s < mixed_->strata().size(); ++s) {
-    const MixedModel::Stratum& stratum = mixed_->strata()[s];
-    hiding |= stratum.means() && stratum.side() == 1 && kRatios[fit_.variances.ratio[s]] >= kHiding;
+  for (std::size_t s = 0; s < data_.mixed().strata().size(); ++s) {
+    const MixedModel::Stratum& stratum = data_.mixed().strata()[s];
+    hiding |= stratum.means() && stratum.side() == 1 && kRatios[found_.fit.variances.ratio[s]] >= kHiding;
   }
   if (!hiding) return;
   const auto is_step = [&](std::size_t i) {
@@ -55,9 +55,9 @@ void Search::add_pairs_of_steps(Scan& scan) const {
 }
 
 JointFit Search::fit_with_all(const std::vector<Term>& terms) const {
-  MeanModel model = fit_.model;
+  MeanModel model = found_.fit.model;
   model.terms.insert(model.terms.end(), terms.begin(), terms.end());
-  return fit_jointly(observations_, model, rows_);
+  return fit_jointly(data_.observations(), model, data_.rows());
 }
 
 std::vector<Term> Search::needed_of(std::vector<Term> terms) const {
@@ -103,19 +103,18 @@ bool Search::accept_together(const Scan& scan, std::size_t i, double p) {
     return std::ranges::any_of(terms, [&](const Term& needed) { return needed.same_way(term); });
   });
   if (terms.size() < 2 ||
-      result_.accepted.size() + terms.size() > static_cast<std::size_t>(settings_.most_effects))
+      found_.accepted.size() + terms.size() > static_cast<std::size_t>(data_.settings().most_effects))
     return false;
   JointFit all = fit_with_all(terms);
   if (!all.at_bound.empty() || (!pair && may_be_another(terms, left_out, all))) return false;
-  const CrossValidation before = unseen(fit_, all.variances), after = unseen(all, all.variances);
+  const CrossValidation before = unseen(found_.fit, all.variances), after = unseen(all, all.variances);
   const LossDifference gain = compare(before, after);
   if (!(gain.mean > gain.standard_error)) return false;
   if (pair && terms[0].effect->has_change_point() && is_gradual(terms, all.variances, after)) return false;
-  fit_ = pair ? at_best_run(at_best_run(std::move(all), 1), 2) : std::move(all);
-  const auto newest = fit_.model.terms.end() - static_cast<std::ptrdiff_t>(terms.size());
-  for (auto term = newest; term != fit_.model.terms.end(); ++term)
-    result_.accepted.push_back({.term = *term, .p = p, .together = true, .confounded = {}});
-  read_back_terms();
+  all = pair ? at_best_run(at_best_run(std::move(all), 1), 2) : std::move(all);
+  for (const Term& term : terms)
+    found_.accepted.push_back({.term = term, .p = p, .together = true, .confounded = {}});
+  found_.set_fit(std::move(all));
   return true;
 }
 

@@ -29,12 +29,12 @@ double worth(const JointFit& fit) {
 }  // namespace
 
 void Search::ask_older_again() {
-  for (std::size_t t = 0; t + 1 < result_.accepted.size();)
+  for (std::size_t t = 0; t + 1 < found_.accepted.size();)
     if (!gives_way(t)) ++t;
 }
 
 bool Search::gives_way(std::size_t t) {
-  const Accepted& old = result_.accepted[t];
+  const Accepted& old = found_.accepted[t];
   if (old.term.per_group || old.term.effect->theory_only)
     return false;  // as for a curve (drop_what_a_curve_replaces)
   const JointFit without = fit_without(t);
@@ -45,15 +45,16 @@ bool Search::gives_way(std::size_t t) {
   std::optional<JointFit> better;
   if (!scan.ways[best].same_way(old.term) && scan.fits[best].evidence > own + kSwapDecades) {
     better = fit_with(without, scan.ways[best], scan.fits[best].amplitude(0));
-    if (!(better->variances.log_likelihood > fit_.variances.log_likelihood) || !better->at_bound.empty())
+    if (!(better->variances.log_likelihood > found_.fit.variances.log_likelihood) ||
+        !better->at_bound.empty())
       better.reset();
   }
   // What was taken for one of several is settled by what they do together.
-  if (!better && (old.together || own >= critical_)) return false;
+  if (!better && (old.together || own >= found_.critical)) return false;
   NullMaxima maxima = maxima_of(without, scan, Draws::kEffects);
   const double p = maxima.p(better ? scan.fits[best].evidence : own);
-  if (p > settings_.alpha)
-    drop(t, without);  // with the newest in, neither is beyond chance
+  if (p > data_.settings().alpha)
+    found_.drop(t, without);  // with the newest in, neither is beyond chance
   else if (better)
     put_in_place(t, *better, p);
   else
@@ -62,10 +63,10 @@ bool Search::gives_way(std::size_t t) {
 }
 
 bool Search::change_a_form() {
-  for (std::size_t t = 0; t < result_.accepted.size(); ++t) {
-    const Term old = result_.accepted[t].term;
+  for (std::size_t t = 0; t < found_.accepted.size(); ++t) {
+    const Term old = found_.accepted[t].term;
     const auto other = [&](const Term& way) { return is_other_form(way, old); };
-    if (old.per_group || std::ranges::none_of(ways_, other)) continue;
+    if (old.per_group || std::ranges::none_of(data_.ways(), other)) continue;
     const JointFit without = fit_without(t);
     const Scan scan = scan_effects(without);
     std::map<std::string, std::size_t> best;  // way of each form
@@ -73,9 +74,9 @@ bool Search::change_a_form() {
       if (other(scan.ways[i])) best.emplace(scan.ways[i].effect->form, i);
     for (const auto& [form, i] : best) {
       const JointFit tried = fit_with(without, scan.ways[i], scan.fits[i].amplitude(0));
-      if (!(worth(tried) > worth(fit_)) || !tried.at_bound.empty()) continue;
+      if (!(worth(tried) > worth(found_.fit)) || !tried.at_bound.empty()) continue;
       const double p = maxima_of(without, scan, Draws::kEffects).p(scan.fits[i].evidence);
-      if (p > settings_.alpha) continue;
+      if (p > data_.settings().alpha) continue;
       put_in_place(t, tried, p);
       return true;
     }
@@ -84,15 +85,8 @@ bool Search::change_a_form() {
 }
 
 void Search::put_in_place(std::size_t t, const JointFit& tried, double p) {
-  fit_ = tried;
-  make_newest(t);
-  result_.accepted.back().p = p;
-  read_back_terms();
-}
-
-void Search::make_newest(std::size_t t) {
-  const auto place = result_.accepted.begin() + static_cast<std::ptrdiff_t>(t);
-  std::rotate(place, place + 1, result_.accepted.end());
+  found_.make_newest(t, tried);
+  found_.accepted.back().p = p;
 }
 
 double Search::evidence_of(const Scan& scan, const Term& term) const {
@@ -103,7 +97,7 @@ double Search::evidence_of(const Scan& scan, const Term& term) const {
 }
 
 JointFit Search::fit_without(std::size_t t, const Observations& observations) const {
-  return fit_jointly(observations, fit_.model.without_term(t), rows_);
+  return fit_jointly(observations, found_.fit.model.without_term(t), data_.rows());
 }
 
 }  // namespace tunnelrig
