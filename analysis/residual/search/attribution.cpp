@@ -1,10 +1,10 @@
-#include "analysis/residual/likelihood/candidates.h"
-#include "analysis/residual/likelihood/testability.h"
+#include "analysis/residual/search/curve_scan.h"
+#include "analysis/residual/search/curve_work.h"
+#include "analysis/residual/search/scatter_beside.h"
 #include "analysis/residual/search/search.h"
-#include "calibration/distributions.h"
 
-#include <algorithm>
-#include <cmath>
+#include <optional>
+#include <utility>
 
 namespace tunnelrig {
 
@@ -15,11 +15,11 @@ Search::Search(const Observations& observations, const std::vector<int>& rows,
 Attribution Search::run() {
   begin();
   add_effects();
-  CurveScan curves = scan_curves();
+  CurveScan curves = scan_curves(data_, found_);
   const auto begin_again = [&] {
     if (!begin_with_scatter_of(curves)) return false;
     add_effects();
-    curves = scan_curves();
+    curves = scan_curves(data_, found_);
     return true;
   };
   // Once more where rotors differ: what was found while they were taken to be alike may have been scatter.
@@ -29,7 +29,7 @@ Attribution Search::run() {
   smooth_curves();
   measure_gains();
   forget_what_has_a_name();
-  result_.session_unknown = session_scatter_is_large();
+  result_.session_unknown = session_scatter_is_large(data_, found_.fit);
   result_.accepted = std::move(found_.accepted);
   result_.curves = std::move(found_.curves);
   result_.beyond_bounds = std::move(found_.beyond_bounds);
@@ -44,7 +44,7 @@ Attribution Search::run() {
 StructureLeft Search::run_on_top_of(const Attribution& found, const JointFit& whole) {
   found_ = {.fit = {}, .accepted = found.accepted, .curves = found.curves};
   found_.set_fit(whole);
-  questions_ = kDrawsOnAllRuns;  // other data sets than the search before has drawn
+  questions_ = Questions(kDrawsOnAllRuns);  // other data sets than the search before has drawn
   StructureLeft left;
   for (std::size_t t = 0; t < found_.accepted.size(); ++t)
     if (bends_away(t)) left.bent.insert(t);
@@ -53,9 +53,9 @@ StructureLeft Search::run_on_top_of(const Attribution& found, const JointFit& wh
   const std::size_t before = found_.curves.size();
   while (few && static_cast<int>(found_.curves.size()) < data_.settings().most_curves) {
     const JointFit without = found_.fit;
-    if (!add_best_curve(scan_curves())) break;
+    if (!add_best_curve(scan_curves(data_, found_))) break;
     for (std::size_t t = 0; t < found_.accepted.size(); ++t)
-      if (!found_.accepted[t].term.per_group && outshone_by_curve(found_.accepted[t].term))
+      if (!found_.accepted[t].term.per_group && outshone_by_curve(data_, found_, found_.accepted[t].term))
         left.bent.insert(t);
     name_newest_curve(without);
   }
@@ -66,9 +66,12 @@ StructureLeft Search::run_on_top_of(const Attribution& found, const JointFit& wh
   return left;
 }
 
-void Search::begin_with(RunScatter scatter) {
-  data_.begin_with(std::move(scatter));
+bool Search::begin_with_scatter_of(const CurveScan& curves) {
+  std::optional<RunScatter> scatter = other_scatter_beside(data_, found_, curves);
+  if (!scatter) return false;
+  data_.begin_with(std::move(*scatter));
   begin();
+  return true;
 }
 
 void Search::begin() {
@@ -77,46 +80,6 @@ void Search::begin() {
   result_ = {};
   result_.baseline = found_.fit;
   result_.detectable_sigma = detectable_by_one(data_.mixed(), found_.fit.variances, data_.settings().alpha);
-}
-
-OwnEvidence::OwnEvidence(const Observations& observations, const MixedModel& baseline)
-    : observations_(observations),
-      baseline_(baseline),
-      predicted_(predict_response(observations, {terms_of_theory(observations), {}}, baseline.rows())) {}
-
-bool OwnEvidence::operator()(const Term& way) const {
-  return baseline_.sees(respond(way, observations_, predicted_).derivative[0]);
-}
-
-std::optional<Eigen::Index> OwnEvidence::undefined(const Term& way) const {
-  const Eigen::MatrixXd column = respond(way, observations_, predicted_).derivative[0][0];
-  for (Eigen::Index row = 0; row < column.rows(); ++row)
-    if (!column.row(row).allFinite()) return row;
-  return {};
-}
-
-std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,
-                           const std::vector<int>& rows) {
-  std::vector<Term> ways;
-  for (const Effect* effect : effects) {
-    if (!testability(*effect, observations).ok()) continue;
-    for (Term& way : ways_to_try(*effect, observations, rows)) ways.push_back(std::move(way));
-  }
-  return ways;
-}
-
-double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha) {
-  const Eigen::RowVectorXd of_all = mixed.mode_matrix().colwise().sum();
-  double information = 0;
-  for (std::size_t s = 0; s < mixed.strata().size(); ++s) {
-    const MixedModel::Stratum& stratum = mixed.strata()[s];
-    if (!stratum.means()) continue;
-    const double runs = static_cast<double>(std::max<Eigen::Index>(mixed.dof(s) / stratum.modes, 1));
-    information += runs * of_all.segment(stratum.first_mode, stratum.modes).squaredNorm() /
-                   (std::pow(variances.sigma[s], 2) * (1 + kRatios[variances.ratio[s]]));
-  }
-  constexpr double kPower = 0.8;
-  return (normal_quantile(1 - alpha / 2) + normal_quantile(kPower)) / std::sqrt(information);
 }
 
 Attribution attribute(const Observations& observations, const std::vector<int>& rows,

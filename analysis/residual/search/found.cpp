@@ -10,8 +10,11 @@ void Found::set_fit(JointFit other) {
   for (std::size_t t = 0; t < accepted.size(); ++t) accepted[t].term = fit.model.terms[t];
 }
 
-void Found::accept(Accepted effect, JointFit with) {
-  accepted.push_back(std::move(effect));
+void Found::accept(JointFit with, double p) {
+  const std::vector<Term>& terms = with.model.terms;
+  const bool together = terms.size() > accepted.size() + 1;
+  for (std::size_t t = accepted.size(); t < terms.size(); ++t)
+    accepted.push_back({.term = terms[t], .p = p, .together = together, .confounded = {}});
   set_fit(std::move(with));
 }
 

@@ -8,19 +8,20 @@
 
 namespace tunnelrig {
 
-/// A value: a question about another model is asked of a copy. The members of a search change it through the
-/// functions below, which keep effects and curves what the fit's terms and curves are, in their order.
+/// A value: a question about another model is asked of a copy. Who changes it does so through the functions
+/// below, which keep effects and curves what the fit's terms and curves are, in their order.
 struct Found {
   JointFit fit;
   std::vector<Accepted> accepted;           // of each term of the fit
   std::vector<FoundCurve> curves;           // of each of its curves
   std::vector<BeyondBounds> beyond_bounds;  // fitted best, and was refused
-  double critical = 0;  // evidence that α asked of the effect that was accepted last; 0: of none yet
+  /// Evidence that α asks of an effect: of the last scan whose best is beyond chance, or else of the first.
+  double critical = 0;
 
   /// Another fit of the same effects and curves.
   void set_fit(JointFit other);
-  /// `with`: the fit with it as its last term.
-  void accept(Accepted effect, JointFit with);
+  /// The last terms of `with`, which is the fit with them: one, or several that were found together.
+  void accept(JointFit with, double p);
   /// `without`: the fit without effect t.
   void drop(std::size_t t, JointFit without);
   /// Effect t comes to be the last; `other`: a fit in which it is, or another one in its place.

@@ -1,14 +1,13 @@
 // Effects that give way to another one, or to another form of their own, with a newer effect in.
-#include "analysis/residual/search/null_maxima.h"
+#include "analysis/residual/search/effect_scan.h"
+#include "analysis/residual/search/fits.h"
 #include "analysis/residual/search/search.h"
 
-#include <algorithm>
 #include <map>
 #include <optional>
-#include <utility>
+#include <string>
 
 namespace tunnelrig {
-
 namespace {
 
 constexpr double kSwapDecades = 0.7;  // another explains that much better: it takes the place
@@ -37,21 +36,21 @@ bool Search::gives_way(std::size_t t) {
   const Accepted& old = found_.accepted[t];
   if (old.term.per_group || old.term.effect->theory_only)
     return false;  // as for a curve (drop_what_a_curve_replaces)
-  const JointFit without = fit_without(t);
-  const Scan scan = scan_effects(without);
+  const JointFit without = fit_without(data_, found_.fit, t);
+  const Scan scan = scan_effects(data_, found_, without);
   if (scan.order.empty()) return false;
   const std::size_t best = scan.order[0];
   const double own = evidence_of(scan, old.term);
   std::optional<JointFit> better;
   if (!scan.ways[best].same_way(old.term) && scan.fits[best].evidence > own + kSwapDecades) {
-    better = fit_with(without, scan.ways[best], scan.fits[best].amplitude(0));
+    better = fit_with(data_, without, scan.ways[best], scan.fits[best].amplitude(0));
     if (!(better->variances.log_likelihood > found_.fit.variances.log_likelihood) ||
         !better->at_bound.empty())
       better.reset();
   }
   // What was taken for one of several is settled by what they do together.
   if (!better && (old.together || own >= found_.critical)) return false;
-  NullMaxima maxima = maxima_of(without, scan, Draws::kEffects);
+  NullMaxima maxima = questions_.maxima_of(data_, without, scan, Draws::kEffects);
   const double p = maxima.p(better ? scan.fits[best].evidence : own);
   if (p > data_.settings().alpha)
     found_.drop(t, without);  // with the newest in, neither is beyond chance
@@ -67,15 +66,15 @@ bool Search::change_a_form() {
     const Term old = found_.accepted[t].term;
     const auto other = [&](const Term& way) { return is_other_form(way, old); };
     if (old.per_group || std::ranges::none_of(data_.ways(), other)) continue;
-    const JointFit without = fit_without(t);
-    const Scan scan = scan_effects(without);
+    const JointFit without = fit_without(data_, found_.fit, t);
+    const Scan scan = scan_effects(data_, found_, without);
     std::map<std::string, std::size_t> best;  // way of each form
     for (const std::size_t i : scan.order)
       if (other(scan.ways[i])) best.emplace(scan.ways[i].effect->form, i);
     for (const auto& [form, i] : best) {
-      const JointFit tried = fit_with(without, scan.ways[i], scan.fits[i].amplitude(0));
+      const JointFit tried = fit_with(data_, without, scan.ways[i], scan.fits[i].amplitude(0));
       if (!(worth(tried) > worth(found_.fit)) || !tried.at_bound.empty()) continue;
-      const double p = maxima_of(without, scan, Draws::kEffects).p(scan.fits[i].evidence);
+      const double p = questions_.maxima_of(data_, without, scan, Draws::kEffects).p(scan.fits[i].evidence);
       if (p > data_.settings().alpha) continue;
       put_in_place(t, tried, p);
       return true;
@@ -89,15 +88,11 @@ void Search::put_in_place(std::size_t t, const JointFit& tried, double p) {
   found_.accepted.back().p = p;
 }
 
-double Search::evidence_of(const Scan& scan, const Term& term) const {
-  double highest = 0;
-  for (std::size_t i = 0; i < scan.ways.size(); ++i)
-    if (scan.ways[i].same_way(term)) highest = std::max(highest, scan.fits[i].evidence);
-  return highest;
-}
-
-JointFit Search::fit_without(std::size_t t, const Observations& observations) const {
-  return fit_jointly(observations, found_.fit.model.without_term(t), data_.rows());
+bool Search::is_still_found(const Term& term, const JointFit& without) {
+  const Scan scan = scan_effects(data_, found_, without);
+  if (scan.order.empty()) return false;
+  return questions_.maxima_of(data_, without, scan, Draws::kStillFound).p(evidence_of(scan, term)) <=
+         data_.settings().alpha;
 }
 
 }  // namespace tunnelrig

@@ -1,0 +1,151 @@
+#include "analysis/residual/search/scatter_beside.h"
+
+#include "analysis/residual/scatter/condition_scatter.h"
+#include "analysis/residual/scatter/contrast_scatter.h"
+#include "analysis/residual/scatter/rotor_scatter.h"
+#include "analysis/residual/scatter/rotor_sessions.h"
+#include "analysis/residual/scatter/run_correlation.h"
+#include "analysis/residual/search/draws.h"
+#include "analysis/residual/search/unseen.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace tunnelrig {
+namespace {
+
+bool are_alike(const Eigen::VectorXd& scatter, const Eigen::VectorXd& other) {
+  constexpr double kAlike = 0.05;
+  return scatter.size() == other.size() &&
+         (scatter.size() == 0 || (scatter.cwiseQuotient(other).array().log().abs() < kAlike).all());
+}
+
+struct ScatterBeside {
+  std::vector<Components> columns;
+  ScatterFit scatter;
+};
+
+/// Beside the model and the best curve, if that has this evidence; or without the curve, where scatter is
+/// likelier.
+ScatterBeside scatter_beside(const SearchData& data, const Found& found, const CurveScan& curves,
+                             double least_evidence, std::mt19937_64& random) {
+  const Components y = difference(data.y(), found.fit.linear.offset);
+  const Eigen::MatrixXd predicted = predict_response(data.observations(), found.fit.model, data.rows());
+  const auto beside = [&](const std::vector<Components>& columns) {
+    return ScatterBeside{columns,
+                         condition_scatter(data.observations(), data.rows(), y, columns, predicted, random)};
+  };
+  // Less ½ ln n for each column and condition.
+  const auto likelihood = [&](const ScatterBeside& of) {
+    const auto parameters = static_cast<double>(of.columns.size() + of.scatter.by_condition.names.size());
+    return of.scatter.variances.log_likelihood -
+           parameters * std::log(static_cast<double>(data.rows().size())) / 2;
+  };
+  ScatterBeside alone = beside(found.fit.linear.columns);
+  if (curves.tried.empty() || curves.scan.fits[curves.scan.order[0]].evidence < least_evidence) return alone;
+  ScatterBeside with = beside(columns_with(found.fit, curves.tried[curves.scan.order[0]].columns));
+  // A curve may be the scatter of a few runs far out on a condition, and scatter a curve.
+  const bool is_scatter = !alone.scatter.by_condition.names.empty() && likelihood(alone) > likelihood(with);
+  return is_scatter ? alone : with;
+}
+
+/// Of single rotors over one condition, those that explain the most together; none where chance does as much.
+std::vector<Curve> of_each_rotor(const CurveScan& curves) {
+  struct OfRotors {
+    double worth = 0;
+    std::vector<Curve> curves;
+    std::size_t columns() const { return curves[0].columns.size(); }
+  };
+  using Condition = std::pair<std::string, std::string>;  // and where
+  std::map<Condition, std::map<std::pair<CurveShape, std::size_t>, OfRotors>> all;
+  std::pair<double, Condition> best;
+  for (std::size_t i = 0; i < curves.tried.size(); ++i) {
+    const Curve& curve = curves.tried[i];
+    if (curve.rotor < 0) continue;
+    const Condition condition{curve.covariate, curve.place.name};
+    OfRotors& own = all[condition][{curve.shape, curve.columns.size()}];
+    own.worth += curves.scan.fits[i].likelihood_ratio - static_cast<double>(curve.columns.size());
+    own.curves.push_back(curve);
+    best = std::max(best, {own.worth, condition});
+  }
+  if (!(best.first > 0)) return {};
+  // What the best of these shapes is by a little too straight for would be a scatter.
+  const auto& shapes = all.at(best.second);
+  return std::ranges::max_element(shapes, {}, [](const auto& shape) { return shape.second.columns(); })
+      ->second.curves;
+}
+
+}  // namespace
+
+std::optional<RunScatter> other_scatter_beside(const SearchData& data, const Found& found,
+                                               const CurveScan& curves) {
+  const RunScatter& before = data.observations().scatter;
+  const bool known = before.rotors_differ();
+  const std::uint64_t seed = data.settings().seed;
+  std::mt19937_64 for_correlation = random_numbers(seed, ScatterDraws::kCorrelation),
+                  for_rotors = random_numbers(seed, ScatterDraws::kRotors),
+                  for_runs = random_numbers(seed, ScatterDraws::kRuns),
+                  for_sessions = random_numbers(seed, ScatterDraws::kSessions),
+                  for_contrasts = random_numbers(seed, ScatterDraws::kContrasts);
+  // While a rotor that scatters more was taken for one like the others, the best curve had a part of its
+  // scatter.
+  const ScatterBeside beside = scatter_beside(data, found, curves, known ? found.critical : 0, for_runs);
+  const std::vector<Components>& columns = beside.columns;
+  const Components y = difference(data.y(), found.fit.linear.offset);
+  Observations scattered = data.observations();
+  RunScatter& scatter = scattered.scatter = {.by_condition = beside.scatter.by_condition};
+  const auto left_beside = [&](const std::vector<Components>& of) {
+    return without(y, of, fit_amplitudes(scattered, y, of, beside.scatter.variances, data.rows()).amplitude);
+  };
+  const Components residual = left_beside(columns);
+  // What a condition does to single rotors, or to them in pairs, is no scatter.
+  std::vector<Components> with_each_rotor = columns;
+  for (const Curve& curve : of_each_rotor(curves))
+    with_each_rotor.insert(with_each_rotor.end(), curve.columns.begin(), curve.columns.end());
+  const Components of_rotors = left_beside(with_each_rotor);
+  // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter.
+  const Eigen::VectorXd contrasts = contrast_scatter(scattered, data.rows(), of_rotors, for_contrasts);
+  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, data.rows(), of_rotors, for_rotors);
+  const MixedModel model(scattered, data.rows());
+  const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);
+  scatter.run_correlation = run_correlation(model, variances, residual, for_correlation);
+  scatter.runs = run_scatter(data.observations(), run_sizes(model, variances, y, columns, for_runs));
+  // The best of many curves makes half of what a dozen sessions differ by, whatever that is.
+  if (contrasts.size() == 0)
+    scatter.sessions =
+        rotor_sessions(scattered, data.rows(), left_beside(found.fit.linear.columns), for_sessions);
+  scatter.contrasts = contrasts;  // after what takes the differences for one stratum
+  if (are_alike(scatter.rotors, before.rotors) && are_alike(contrasts, before.contrasts) &&
+      scatter.sessions.rotors == before.sessions.rotors &&
+      (before.runs.size() > 0) == (scatter.runs.size() > 0) &&
+      before.by_condition.names == scatter.by_condition.names &&
+      (known || scatter.run_correlation == before.run_correlation))
+    return std::nullopt;
+  return std::move(scatter);
+}
+
+std::optional<SessionScatter> session_scatter_is_large(const SearchData& data, const JointFit& fit) {
+  constexpr double kOneSided = 0.025;  // a lower bound of 95 %
+  const RotorSessions& unlike = data.observations().scatter.sessions;
+  std::optional<SessionScatter> of_rotor;
+  for (std::size_t s = 0; s < data.mixed().strata().size(); ++s) {
+    if (!data.mixed().strata()[s].means()) continue;
+    double below = 0;
+    for (std::size_t r = 0; r < fit.variances.ratio_probability[s].size(); ++r) {
+      if (kRatios[r] <= data.settings().session_ratio * data.settings().session_ratio)
+        below += fit.variances.ratio_probability[s][r];
+    }
+    if (below >= kOneSided) continue;
+    const Eigen::Index mode = data.mixed().strata()[s].first_mode;  // the first is what all have in common
+    const bool own = unlike.rotors.size() == 1 && mode > 0 && mode < unlike.alone;
+    if (!own) return SessionScatter{-1, below};
+    of_rotor = SessionScatter{unlike.rotors[0], below};
+  }
+  return of_rotor;
+}
+
+}  // namespace tunnelrig
