@@ -8,6 +8,8 @@
 
 namespace tunnelrig {
 
+/// Counts the questions, so that no two are answered by the same data sets; the order in which they are asked
+/// is a part of the result.
 class Questions {
  public:
   /// `asked`: so many streams of random numbers are passed over.
