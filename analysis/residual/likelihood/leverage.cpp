@@ -17,7 +17,7 @@ VectorXd MixedModel::baseline_leverage(std::size_t stratum, std::size_t ratio) c
   if (!strata_[stratum].means()) return VectorXd::Zero(static_cast<Index>(rows_.size()));
   const auto& normal = prepared(stratum, ratio).normal;
   if (!normal) return own_.rowwise().squaredNorm();
-  const MatrixXd covariance = normal->solve(MatrixXd::Identity(columns_, columns_));
+  const MatrixXd covariance = normal->inverse_columns(0, columns_);
   VectorXd result(static_cast<Index>(rows_.size()));
   for (const std::vector<Index>& runs : blocks_) {
     std::vector<Index> used;  // columns of the groups that this block has

@@ -205,16 +205,16 @@ Eigen::RowVectorXd MixedModel::baseline_row(const GroupBaseline& group, int row)
   return observations_.baseline_columns(std::array{row}) * group.to_orthonormal;
 }
 
-MixedModel::NormalParts MixedModel::normal_parts(double run_correlation) const {
+NormalParts MixedModel::normal_parts(double run_correlation) const {
   const Root root(blocks_, scatter_, 0, run_correlation);
   const Index each = own_.cols();
-  NormalParts parts{MatrixXd::Zero(columns_, columns_),
-                    MatrixXd::Zero(columns_, static_cast<Index>(blocks_.size()))};
+  NormalParts parts{.columns = columns_, .blocks = VectorXd(static_cast<Index>(blocks_.size()))};
   struct Entry {
     Index first;
     Eigen::RowVectorXd values;
   };
-  for (std::size_t b = 0; b < blocks_.size(); ++b)
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    parts.blocks(static_cast<Index>(b)) = root.squared_norm(b);
     for (std::size_t k = 0; k < blocks_[b].size(); ++k) {
       std::vector<Entry> row;  // of A D⁻¹ L: a run less a part of the one before it
       const auto add = [&](Index run, double weight) {
@@ -223,14 +223,19 @@ MixedModel::NormalParts MixedModel::normal_parts(double run_correlation) const {
       };
       add(blocks_[b][k], k == 0 ? 1 : root.scale());
       if (k > 0 && run_correlation != 0) add(blocks_[b][k - 1], -run_correlation * root.scale());
-      for (const Entry& one : row) {
-        parts.of_blocks.col(static_cast<Index>(b)).segment(one.first, each) +=
-            root.w(blocks_[b][k]) * one.values.transpose();
-        for (const Entry& other : row)
-          parts.independent.block(one.first, other.first, each, each) +=
-              one.values.transpose() * other.values;
-      }
+      for (const Entry& one : row)
+        for (Index i = 0; i < each; ++i) {
+          parts.of_blocks.emplace_back(one.first + i, b, root.w(blocks_[b][k]) * one.values(i));
+          for (const Entry& other : row)
+            for (Index j = 0; j < each; ++j)
+              parts.independent.emplace_back(one.first + i, other.first + j, one.values(i) * other.values(j));
+        }
     }
+  }
+  for (const auto& [number, group] : groups_)
+    for (Index k = 0; k < each; ++k)
+      if (group.to_orthonormal.col(k).isZero(0))
+        parts.independent.emplace_back(group.first + k, group.first + k, 1);
   return parts;
 }
 
@@ -242,17 +247,8 @@ std::vector<MixedModel::Prepared> MixedModel::prepare(double run_correlation,
     result[r].log_xvx = log_of_groups_;
     if (kRatios[r] == 0 && run_correlation == 0 && (scatter_.array() == 1).all()) continue;
     if (!parts) parts = normal_parts(run_correlation);
-    const Root root(blocks_, scatter_, kRatios[r], run_correlation);
-    Eigen::VectorXd weight(parts->of_blocks.cols());
-    for (std::size_t b = 0; b < blocks_.size(); ++b)
-      weight(static_cast<Index>(b)) = std::sqrt(kRatios[r] / (1 + kRatios[r] * root.squared_norm(b)));
-    MatrixXd normal = parts->independent;
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(parts->of_blocks * weight.asDiagonal(), -1);
-    for (const auto& [number, group] : groups_)
-      for (Index k = 0; k < own_.cols(); ++k)
-        if (group.to_orthonormal.col(k).isZero(0)) normal(group.first + k, group.first + k) = 1;
-    result[r].normal.emplace(normal);
-    result[r].log_xvx += 2 * result[r].normal->matrixLLT().diagonal().array().log().sum();
+    result[r].normal.emplace(*parts, kRatios[r]);
+    result[r].log_xvx += result[r].normal->log_determinant();
   }
   return result;
 }
@@ -264,7 +260,7 @@ MatrixXd MixedModel::baseline_coefficients(std::size_t stratum, std::size_t rati
     for (Index k = 0; k < own_.cols(); ++k)
       for (Index run = 0; run < whitened.rows(); ++run)
         result(first_column_[static_cast<std::size_t>(run)] + k, c) += own_(run, k) * whitened(run, c);
-  if (const auto& normal = prepared(stratum, ratio).normal) normal->solveInPlace(result);
+  if (const auto& normal = prepared(stratum, ratio).normal) return normal->solve(result);
   return result;
 }
 
@@ -361,10 +357,8 @@ Eigen::VectorXd MixedModel::baseline_variance(std::size_t stratum, std::size_t r
     if (fresh && !normal) {
       known->second.setIdentity(own_.cols(), own_.cols());
     } else if (fresh) {
-      const Index below = columns_ - group->second.first;  // above them the solution is 0
-      MatrixXd half = MatrixXd::Identity(below, own_.cols());
-      normal->matrixLLT().bottomRightCorner(below, below).triangularView<Eigen::Lower>().solveInPlace(half);
-      known->second = half.transpose() * half;
+      const Index first = group->second.first, count = own_.cols();
+      known->second = normal->inverse_columns(first, count).middleRows(first, count);
     }
     const Eigen::RowVectorXd row = baseline_row(group->second, rows[r]);
     variance = row.dot(row * known->second);

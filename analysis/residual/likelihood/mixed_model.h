@@ -11,6 +11,7 @@
 // equations.
 #pragma once
 
+#include "analysis/residual/likelihood/baseline_normal.h"
 #include "analysis/residual/likelihood/terms.h"
 
 #include <array>
@@ -136,18 +137,14 @@ class MixedModel {
   /// L of the whole baseline in one stratum of runs' means, at one ratio.
   struct Prepared {
     /// LᵀV⁻¹L, 1 on the diagonal where a column is 0; nothing where V is 1, and so LᵀL.
-    std::optional<Eigen::LLT<Eigen::MatrixXd>> normal;
+    std::optional<BaselineNormal> normal;
     double log_xvx = 0;  // its log determinant, before columns were made orthonormal
   };
 
   MixedModel(const Observations& observations, std::vector<int> rows, const std::vector<std::size_t>& ratio,
              const RunScatter& scatter);
   void set_groups();
-  /// LᵀV⁻¹L = independent − Σ a/(1 + a wᵀw) s sᵀ over the blocks' columns s, since with the root's A and w
-  /// V⁻¹ = AᵀA − Σ a/(1 + a wᵀw) Aᵀw wᵀA.
-  struct NormalParts {
-    Eigen::MatrixXd independent, of_blocks;
-  };
+  /// With the root's A and w: LᵀD⁻¹AᵀAD⁻¹L, the blocks' LᵀD⁻¹Aᵀw, and wᵀw.
   NormalParts normal_parts(double run_correlation) const;
   /// At the ratios that are wanted.
   std::vector<Prepared> prepare(double run_correlation, const std::set<std::size_t>& ratio) const;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+#include <limits>
 
 namespace tunnelrig {
 namespace {
@@ -11,7 +11,6 @@ using Eigen::Index;
 
 constexpr std::size_t kSimulated = 100;
 constexpr double kKnown = 0.5;  // correlation of the second simulation
-constexpr double kMostCorrelated = 0.9;
 
 /// Σ e_i e_{i+1} / Σ e_i² over neighbours within blocks, one per column.
 Eigen::VectorXd of_neighbours(const MixedModel& model, std::size_t stratum, const Stacked& columns) {
@@ -41,15 +40,59 @@ Spread simulated(const MixedModel& model, const NullFit& fit, std::size_t stratu
   return {seen.mean(), std::sqrt((seen.array() - seen.mean()).square().mean())};
 }
 
+/// Restricted log likelihood of a residual in one stratum, of the session variance that is likeliest.
+double log_likelihood(const MixedModel& model, std::size_t stratum, const Stacked& residual) {
+  const auto dof = static_cast<double>(model.dof(stratum));
+  double best = -std::numeric_limits<double>::infinity();
+  for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
+    Stacked left = residual;
+    model.project(stratum, ratio, left);
+    best = std::max(best, -0.5 * dof * std::log(left.squaredNorm()) - model.log_determinant(stratum, ratio));
+  }
+  return best;
+}
+
+/// Where a parabola through three values, `step` from each other, is highest: from the middle one.
+double highest(double before, double here, double after, double step) {
+  const double bend = before - 2 * here + after;
+  return bend < 0 ? step * 0.5 * (before - after) / bend : 0;
+}
+
+/// Of each side that was found to be correlated (others: 0) the likeliest correlation.
+std::array<double, 2> likeliest(Observations observations, const MixedModel& model,
+                                const Components& residual, std::array<bool, 2> found) {
+  constexpr double kStep = 0.1;
+  constexpr int kSteps = 9;  // no more than 0.9
+  std::array<std::array<double, kSteps + 1>, 2> likelihood = {};
+  for (int i = 0; i <= kSteps; ++i) {
+    observations.scatter.run_correlation = {i * kStep, i * kStep};
+    const MixedModel correlated(observations, model.rows());
+    for (std::size_t s = 0; s < model.strata().size(); ++s)
+      if (const MixedModel::Stratum& stratum = model.strata()[s]; stratum.means() && found[stratum.side()])
+        likelihood[stratum.side()][static_cast<std::size_t>(i)] +=
+            log_likelihood(correlated, s, model.stack(s, {&residual}));
+  }
+  std::array<double, 2> result = {0, 0};
+  for (std::size_t side = 0; side < found.size(); ++side) {
+    if (!found[side]) continue;
+    const auto& of = likelihood[side];
+    const auto at = static_cast<std::size_t>(std::ranges::max_element(of) - of.begin());
+    result[side] = static_cast<double>(at) * kStep;
+    if (at > 0 && at < of.size() - 1) result[side] += highest(of[at - 1], of[at], of[at + 1], kStep);
+  }
+  return result;
+}
+
 }  // namespace
 
-std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fit, const Components& residual,
+std::array<double, 2> run_correlation(const Observations& observations, const MixedModel& model,
+                                      const NullFit& fit, const Components& residual,
                                       std::mt19937_64& random) {
   constexpr double kRounding = 1e-9;
-  std::array<double, 2> result = {0, 0};
   const bool neighbours = std::any_of(model.blocks().begin(), model.blocks().end(),
                                       [](const auto& runs) { return runs.size() > 1; });
-  if (!neighbours) return result;
+  if (!neighbours) return {0, 0};
+  std::array<bool, 2> found = {false, false};
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
     if (!model.strata()[s].means()) continue;
     Stacked column = model.stack(s, {&residual});
@@ -59,11 +102,11 @@ std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fi
     if (seen < none.mean + 2 * none.deviation) continue;
     const Spread known = simulated(model, fit, s, kKnown, random);
     // Of blocks that are groups of two runs it is −1/2 whatever the correlation.
-    if (!(none.deviation > kRounding) || known.mean - none.mean < 2 * none.deviation) continue;
-    result[model.strata()[s].side()] =
-        std::clamp(kKnown * (seen - none.mean) / (known.mean - none.mean), 0.0, kMostCorrelated);
+    if (none.deviation > kRounding && known.mean - none.mean >= 2 * none.deviation)
+      found[model.strata()[s].side()] = true;
   }
-  return result;
+  if (found == std::array{false, false}) return {0, 0};
+  return likeliest(observations, model, residual, found);
 }
 
 double row_correlation(const Observations& observations, const std::vector<int>& rows,

@@ -10,10 +10,13 @@ namespace tunnelrig {
 
 /// Of what rotors have in common, and of what they differ by: the correlation of neighbouring runs within
 /// their blocks (order of rows is order of time) in residuals of a model that was fitted without any; 0 where
-/// it is within two standard deviations of what independent runs show. What the baseline takes from the
-/// residuals, and with it their correlation, is allowed for by simulation: data of known correlation go the
-/// same way.
-std::array<double, 2> run_correlation(const MixedModel& model, const NullFit& fit, const Components& residual,
+/// it is within two standard deviations of what independent runs show, or where data of a known one would
+/// show none. What the baseline takes from the residuals, and with it their correlation, is allowed for by
+/// simulation. Elsewhere it is the likeliest by restricted likelihood, with the session variance that is
+/// likeliest beside it: independent runs would have sessions differ by what correlated ones drift.
+/// `model`: of `observations`, and `fit` its.
+std::array<double, 2> run_correlation(const Observations& observations, const MixedModel& model,
+                                      const NullFit& fit, const Components& residual,
                                       std::mt19937_64& random);
 
 /// Of a table's rows, which are independent in the model: the correlation of what is left of a row with what

@@ -112,7 +112,7 @@ std::optional<RunScatter> other_scatter_beside(const SearchData& data, const Fou
   if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, data.rows(), of_rotors, for_rotors);
   const MixedModel model(scattered, data.rows());
   const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);
-  scatter.run_correlation = run_correlation(model, variances, residual, for_correlation);
+  scatter.run_correlation = run_correlation(scattered, model, variances, residual, for_correlation);
   scatter.runs = run_scatter(data.observations(), run_sizes(model, variances, y, columns, for_runs));
   // The best of many curves makes half of what a dozen sessions differ by, whatever that is.
   if (contrasts.size() == 0)

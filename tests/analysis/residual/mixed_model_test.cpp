@@ -245,7 +245,7 @@ TEST(RunCorrelation, IsFoundWhereItIsAndNowhereElse) {
       // the difference modes' data, turned back into rotors
       const Eigen::Map<const Eigen::MatrixXd> modes(drawn.data(), o.rows(), 3);
       const Components rotors = {modes * model.mode_matrix().rightCols(3).transpose()};
-      const double correlation = run_correlation(model, fit, rotors, random)[1];
+      const double correlation = run_correlation(o, model, fit, rotors, random)[1];
       mean += correlation / kCampaigns;
       found += correlation > 0 ? 1 : 0;
     }
