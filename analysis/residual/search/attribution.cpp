@@ -1,159 +1,150 @@
-#include "analysis/residual/likelihood/candidates.h"
+// The search as a whole: effects, what the runs scatter like beside them, curves, and then what else could be
+// said of what was found.
+#include "analysis/residual/search/attribution.h"
+
 #include "analysis/residual/likelihood/testability.h"
-#include "analysis/residual/search/search.h"
-#include "calibration/distributions.h"
+#include "analysis/residual/search/curve_scan.h"
+#include "analysis/residual/search/curve_steps.h"
+#include "analysis/residual/search/curve_work.h"
+#include "analysis/residual/search/effect_steps.h"
+#include "analysis/residual/search/group_amplitudes.h"
+#include "analysis/residual/search/rivals.h"
+#include "analysis/residual/search/scatter_beside.h"
+#include "analysis/residual/search/search_state.h"
+#include "analysis/residual/search/unseen.h"
 
 #include <algorithm>
-#include <cmath>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
 
 namespace tunnelrig {
+namespace {
 
-Search::Search(const Observations& observations, const std::vector<int>& rows,
-               const std::vector<const Effect*>& effects, const SearchSettings& settings)
-    : whole_(observations),
-      given_(observations.without_responses_but(rows)),
-      observations_(given_),
-      rows_(rows),
-      effects_(effects),
-      settings_(settings),
-      curves_(curves_to_try(observations_, rows)),
-      y_(response_components(observations_)) {}
+/// The model without any effect; what was found before is forgotten.
+void begin(SearchState& state) {
+  const SearchData& data = state.data;
+  state.found = {};
+  state.found.fit = fit_jointly(data.observations(), {}, data.rows());
+  state.record = {.baseline = state.found.fit};
+  state.record.detectable.largest =
+      detectable_by_one(data.mixed(), state.found.fit.variances, data.settings().alpha);
+}
 
-Attribution Search::run() {
-  begin();
-  add_effects();
-  CurveScan curves = scan_curves();
+/// The effects, and the curves on top of them. Where the runs scatter otherwise than it was taken for the
+/// search has begun again, with such scatter.
+CurveScan search_effects(SearchState& state) {
+  begin(state);
+  add_effects(state);
+  CurveScan curves = scan_curves(state.data, state.found);
   const auto begin_again = [&] {
-    if (!begin_with_scatter_of(curves)) return false;
-    add_effects();
-    curves = scan_curves();
+    std::optional<RunScatter> scatter = other_scatter_beside(state.data, state.found, curves);
+    if (!scatter) return false;
+    state.data.begin_with(std::move(*scatter));
+    begin(state);
+    add_effects(state);
+    curves = scan_curves(state.data, state.found);
     return true;
   };
   // Once more where rotors differ: what was found while they were taken to be alike may have been scatter.
-  if (begin_again() && observations_.scatter.rotors_differ()) begin_again();
-  add_curves(curves);
-  find_confounded();
-  smooth_curves();
-  measure_gains();
-  forget_what_has_a_name();
-  result_.session_unknown = session_scatter_is_large();
-  result_.final = fit_;
-  result_.observations = std::move(observations_);
-  result_.observations.value = whole_.value;
-  result_.observations.y = whole_.y;
-  result_.observations.shape = whole_.shape;
-  return std::move(result_);
+  if (begin_again() && state.data.observations().scatter.rotors_differ()) begin_again();
+  return curves;
 }
 
-StructureLeft Search::run_on_top_of(const Attribution& found, const JointFit& whole) {
-  make_models();
-  list_ways();
-  result_.accepted = found.accepted;
-  result_.curves = found.curves;
-  fit_ = whole;
-  read_back_terms();
-  questions_ = kDrawsOnAllRuns;  // other data sets than the search before has drawn
-  StructureLeft left;
-  for (std::size_t t = 0; t < result_.accepted.size(); ++t)
-    if (bends_away(t)) left.bent.insert(t);
-  // Of single rows the seal leaves plenty, and what `hold_out` declares is not to be seen by any search.
-  const bool few = !observations_.blocks_are_rows && observations_.held_out.empty();
-  const std::size_t before = result_.curves.size();
-  while (few && static_cast<int>(result_.curves.size()) < settings_.most_curves) {
-    const JointFit without = fit_;
-    if (!add_best_curve(scan_curves())) break;
-    for (std::size_t t = 0; t < result_.accepted.size(); ++t)
-      if (!result_.accepted[t].term.per_group && outshone_by_curve(result_.accepted[t].term))
-        left.bent.insert(t);
-    name_newest_curve(without);
+/// What each accepted effect does for blocks that were not seen, beside all that was found.
+void measure_gains(const SearchData& data, Found& found) {
+  const JointFit& fit = found.fit;
+  const double with = unseen(data, fit, fit.variances).rmse();
+  for (std::size_t t = 0; t < found.accepted.size(); ++t) {
+    Observations others = found.accepted[t].term.per_group ? without_own(data.observations(), fit.model, t)
+                                                           : data.observations();
+    const JointFit without = fit_in_turns(others, fit.model.without_term(t), data.rows());
+    found.accepted[t].gain = unseen(data, others, without, without.variances).rmse() - with;
   }
-  smooth_curves(before);
-  left.curves = {result_.curves.begin() + static_cast<std::ptrdiff_t>(before), result_.curves.end()};
-  left.fit = std::move(fit_);
-  left.rounds = std::move(result_.curve_rounds);
-  return left;
 }
 
-void Search::begin() {
-  RunScatter scatter = std::move(observations_.scatter);
-  observations_ = given_;
-  observations_.scatter = std::move(scatter);
-  make_models();
-  list_ways();
-  result_ = {};
-  result_.baseline = fit_jointly(observations_, {}, rows_);
-  fit_ = result_.baseline;
-  result_.detectable_sigma = detectable_by_one(*mixed_, fit_.variances, settings_.alpha);
-  critical_ = 0;
-}
-
-void Search::make_models() {
-  mixed_ = std::make_unique<MixedModel>(observations_, rows_);
-  baseline_ = std::make_unique<MixedModel>(MixedModel::baseline_alone(observations_, rows_));
-}
-
-void Search::list_ways() {
-  ways_ = all_ways(effects_, observations_, rows_);
-  const OwnEvidence has_evidence(observations_, *baseline_);
-  const auto taken_back = [&](const Term& way) {
-    return std::ranges::any_of(settings_.taken_back, [&](const Term& term) {
-      return term.effect->cause() == way.effect->cause() && term.rotor == way.rotor &&
-             term.other == way.other;
+/// What gave way to a curve, and then to another name over the same condition, may not be it any more.
+void forget_what_has_a_name(const Observations& observations, Found& found) {
+  const auto has = [&](const Term& term) {
+    return std::ranges::any_of(found.accepted, [&](const Accepted& accepted) {
+      return share_a_condition(*accepted.term.effect, *term.effect, observations);
     });
   };
-  std::erase_if(ways_, [&](const Term& way) { return taken_back(way) || !has_evidence(way); });
-  points_.clear();
-  for (const Term& way : ways_) ++points_[way.effect->name + std::to_string(way.rotor)];
-}
-
-OwnEvidence::OwnEvidence(const Observations& observations, const MixedModel& baseline)
-    : observations_(observations),
-      baseline_(baseline),
-      predicted_(predict_response(observations, {terms_of_theory(observations), {}}, baseline.rows())) {}
-
-bool OwnEvidence::operator()(const Term& way) const {
-  return baseline_.sees(respond(way, observations_, predicted_).derivative[0]);
-}
-
-std::optional<Eigen::Index> OwnEvidence::undefined(const Term& way) const {
-  const Eigen::MatrixXd column = respond(way, observations_, predicted_).derivative[0][0];
-  for (Eigen::Index row = 0; row < column.rows(); ++row)
-    if (!column.row(row).allFinite()) return row;
-  return {};
-}
-
-std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,
-                           const std::vector<int>& rows) {
-  std::vector<Term> ways;
-  for (const Effect* effect : effects) {
-    if (!testability(*effect, observations).ok()) continue;
-    for (Term& way : ways_to_try(*effect, observations, rows)) ways.push_back(std::move(way));
+  const auto is_named = [&](const std::string& name) {
+    return std::ranges::any_of(found.accepted,
+                               [&](const Accepted& accepted) { return accepted.term.effect->name == name; });
+  };
+  for (FoundCurve& curve : found.curves) {
+    std::erase_if(curve.could_be, has);
+    std::erase_if(curve.instead_of, is_named);  // taken again after the curve
   }
-  return ways;
 }
 
-double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha) {
-  const Eigen::RowVectorXd of_all = mixed.mode_matrix().colwise().sum();
-  double information = 0;
-  for (std::size_t s = 0; s < mixed.strata().size(); ++s) {
-    const MixedModel::Stratum& stratum = mixed.strata()[s];
-    if (!stratum.means()) continue;
-    const double runs = static_cast<double>(std::max<Eigen::Index>(mixed.dof(s) / stratum.modes, 1));
-    information += runs * of_all.segment(stratum.first_mode, stratum.modes).squaredNorm() /
-                   (std::pow(variances.sigma[s], 2) * (1 + kRatios[variances.ratio[s]]));
-  }
-  constexpr double kPower = 0.8;
-  return (normal_quantile(1 - alpha / 2) + normal_quantile(kPower)) / std::sqrt(information);
+/// Effects whose curve, the newest, does more beside them than their formulas may leave.
+std::set<std::size_t> outshone(const SearchData& data, const Found& found) {
+  std::set<std::size_t> result;
+  for (std::size_t t = 0; t < found.accepted.size(); ++t)
+    if (!found.accepted[t].term.per_group && outshone_by_curve(data, found, found.accepted[t].term))
+      result.insert(t);
+  return result;
 }
+
+}  // namespace
 
 Attribution attribute(const Observations& observations, const std::vector<int>& rows,
                       const std::vector<const Effect*>& effects, const SearchSettings& settings) {
-  return Search(observations, rows, effects, settings).run();
+  SearchState state{.data = {observations, rows, effects, settings}};
+  const SearchData& data = state.data;
+  Found& found = state.found;
+  add_curves(state, search_effects(state));
+  for (std::size_t t = 0; t < found.accepted.size(); ++t)
+    found.accepted[t].confounded = rivals_of(data, found, t);
+  smooth_curves(data, found);
+  measure_gains(data, found);
+  forget_what_has_a_name(data.observations(), found);
+  Attribution result{.accepted = std::move(found.accepted),
+                     .curves = std::move(found.curves),
+                     .beyond_bounds = std::move(found.beyond_bounds),
+                     .session_unknown = session_scatter_is_large(data, found.fit),
+                     .baseline = std::move(state.record.baseline),
+                     .final = found.fit,
+                     .observations = data.observations(),
+                     .rounds = std::move(state.record.rounds),
+                     .curve_rounds = std::move(state.record.curve_rounds),
+                     .detectable_sigma = state.record.detectable.largest,
+                     .detectable_by_effect = std::move(state.record.detectable.by_effect)};
+  // The responses of the other rows as well.
+  result.observations.value = observations.value;
+  result.observations.y = observations.y;
+  result.observations.shape = observations.shape;
+  return result;
 }
 
-StructureLeft structure_left(const Attribution& found, const JointFit& whole, const std::vector<int>& rows,
+StructureLeft structure_left(const Attribution& before, const JointFit& whole, const std::vector<int>& rows,
                              const std::vector<const Effect*>& effects, const SearchSettings& settings) {
-  return Search(found.observations, rows, effects, settings).run_on_top_of(found, whole);
+  SearchState state{.data = {before.observations, rows, effects, settings},
+                    .found = {.fit = {}, .accepted = before.accepted, .curves = before.curves},
+                    .questions = Questions(kDrawsOnAllRuns)};
+  const SearchData& data = state.data;
+  Found& found = state.found;
+  found.set_fit(whole);
+  StructureLeft left;
+  for (std::size_t t = 0; t < found.accepted.size(); ++t)
+    if (bends_away(data, found, t, state.questions)) left.bent.insert(t);
+  // Of single rows the seal leaves plenty, and what `hold_out` declares is not to be seen by any search.
+  const bool few = !data.observations().blocks_are_rows && data.observations().held_out.empty();
+  while (few && static_cast<int>(found.curves.size()) < settings.most_curves) {
+    const JointFit without = found.fit;
+    if (!add_best_curve(state, scan_curves(data, found))) break;
+    left.bent.merge(outshone(data, found));
+    found.curves.back().could_be = names_of_newest_curve(data, found, without, state.questions);
+  }
+  smooth_curves(data, found, before.curves.size());
+  left.curves = {found.curves.begin() + std::ssize(before.curves), found.curves.end()};
+  left.fit = std::move(found.fit);
+  left.rounds = std::move(state.record.curve_rounds);
+  return left;
 }
 
 }  // namespace tunnelrig

@@ -1,15 +1,19 @@
-// What runs scatter like, beside what the search has found so far; and the search begun again with it.
+#include "analysis/residual/search/scatter_beside.h"
+
+#include "analysis/residual/scatter/condition_scatter.h"
 #include "analysis/residual/scatter/contrast_scatter.h"
 #include "analysis/residual/scatter/rotor_scatter.h"
 #include "analysis/residual/scatter/rotor_sessions.h"
 #include "analysis/residual/scatter/run_correlation.h"
-#include "analysis/residual/search/search.h"
+#include "analysis/residual/search/draws.h"
+#include "analysis/residual/search/unseen.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace tunnelrig {
 namespace {
@@ -20,76 +24,37 @@ bool are_alike(const Eigen::VectorXd& scatter, const Eigen::VectorXd& other) {
          (scatter.size() == 0 || (scatter.cwiseQuotient(other).array().log().abs() < kAlike).all());
 }
 
-/// Runs so far off that data sets with them would be made by them alone, the furthest first. `sizes`: rms 1.
-std::vector<Eigen::Index> far_runs(const std::vector<Eigen::MatrixXd>& sizes, std::size_t most) {
-  constexpr double kFar = 5;
-  std::vector<std::pair<double, Eigen::Index>> far;
-  for (const Eigen::MatrixXd& of_stratum : sizes)
-    for (Eigen::Index run = 0; run < of_stratum.rows(); ++run)
-      if (const double size = of_stratum.row(run).maxCoeff(); size > kFar) far.emplace_back(size, run);
-  std::sort(far.rbegin(), far.rend());
-  std::vector<Eigen::Index> runs;
-  for (const auto& [size, run] : far)
-    if (runs.size() < most && std::find(runs.begin(), runs.end(), run) == runs.end()) runs.push_back(run);
-  return runs;
-}
+struct ScatterBeside {
+  std::vector<Components> columns;
+  ScatterFit scatter;
+};
 
-}  // namespace
-
-std::vector<Eigen::MatrixXd> Search::sizes_beside(const JointFit& fit, const Candidate& candidate,
-                                                  const CandidateFit& found) const {
-  constexpr Eigen::Index kFewest = 20;
-  constexpr std::size_t kMostFar = 3;
-  if (mixed_->dof(0) < kFewest) return {};
-  const Components y = difference(y_, fit.linear.offset);
-  const auto sizes = [&](const std::vector<Eigen::Index>& as_they_are) {
-    return mixed_->sizes_left(fit.variances.ratio, fit.variances.sigma, y, candidate.columns, found.amplitude,
-                              as_they_are);
-  };
-  auto result = sizes({});
-  // Where a condition has one value far out, a curve that is only nearly right is far off without that run.
-  const std::vector<Eigen::Index> far = far_runs(result, kMostFar);
-  return far.empty() || !is_found_without(far, fit, candidate, found) ? result : sizes(far);
-}
-
-bool Search::is_found_without(const std::vector<Eigen::Index>& places, const JointFit& fit,
-                              const Candidate& candidate, const CandidateFit& found) const {
-  constexpr double kMost = 0.7;
-  const Eigen::Index channels = y_[0].cols();
-  Components nothing;
-  for (const Eigen::MatrixXd& component : y_)
-    nothing.push_back(Eigen::MatrixXd::Zero(component.rows(), component.cols()));
-  std::vector<Components> columns = fit.linear.columns;
-  for (const Eigen::Index place : places)
-    for (Eigen::Index channel = 0; channel < channels; ++channel) {
-      columns.push_back(nothing);
-      columns.back()[0](rows_[static_cast<std::size_t>(place)], channel) = 1;
-    }
-  const CandidateScan scan(*mixed_, columns, {candidate});
-  return scan.fit(difference(y_, fit.linear.offset))[0].evidence > kMost * found.evidence;
-}
-
-Search::ScatterBeside Search::scatter_beside(const CurveScan& curves, double least_evidence,
-                                             std::mt19937_64& random) const {
-  const Components y = difference(y_, fit_.linear.offset);
-  const Eigen::MatrixXd predicted = predict_response(observations_, fit_.model, rows_);
+/// Beside the model and the best curve, if that has this evidence; or without the curve, where scatter is
+/// likelier.
+ScatterBeside scatter_beside(const SearchData& data, const Found& found, const CurveScan& curves,
+                             double least_evidence, std::mt19937_64& random) {
+  const Components y = difference(data.y(), found.fit.linear.offset);
+  const Eigen::MatrixXd predicted = predict_response(data.observations(), found.fit.model, data.rows());
   const auto beside = [&](const std::vector<Components>& columns) {
-    return ScatterBeside{columns, condition_scatter(observations_, rows_, y, columns, predicted, random)};
+    return ScatterBeside{columns,
+                         condition_scatter(data.observations(), data.rows(), y, columns, predicted, random)};
   };
   // Less ½ ln n for each column and condition.
   const auto likelihood = [&](const ScatterBeside& of) {
     const auto parameters = static_cast<double>(of.columns.size() + of.scatter.by_condition.names.size());
-    return of.scatter.variances.log_likelihood - parameters * std::log(static_cast<double>(rows_.size())) / 2;
+    return of.scatter.variances.log_likelihood -
+           parameters * std::log(static_cast<double>(data.rows().size())) / 2;
   };
-  ScatterBeside alone = beside(fit_.linear.columns);
+  ScatterBeside alone = beside(found.fit.linear.columns);
   if (curves.tried.empty() || curves.scan.fits[curves.scan.order[0]].evidence < least_evidence) return alone;
-  ScatterBeside with = beside(columns_with(curves.tried[curves.scan.order[0]].columns));
+  ScatterBeside with = beside(columns_with(found.fit, curves.tried[curves.scan.order[0]].columns));
   // A curve may be the scatter of a few runs far out on a condition, and scatter a curve.
   const bool is_scatter = !alone.scatter.by_condition.names.empty() && likelihood(alone) > likelihood(with);
   return is_scatter ? alone : with;
 }
 
-std::vector<Curve> Search::of_each_rotor(const CurveScan& curves) {
+/// Of single rotors over one condition, those that explain the most together; none where chance does as much.
+std::vector<Curve> of_each_rotor(const CurveScan& curves) {
   struct OfRotors {
     double worth = 0;
     std::vector<Curve> curves;
@@ -114,10 +79,13 @@ std::vector<Curve> Search::of_each_rotor(const CurveScan& curves) {
       ->second.curves;
 }
 
-bool Search::begin_with_scatter_of(const CurveScan& curves) {
-  const RunScatter& before = observations_.scatter;
+}  // namespace
+
+std::optional<RunScatter> other_scatter_beside(const SearchData& data, const Found& found,
+                                               const CurveScan& curves) {
+  const RunScatter& before = data.observations().scatter;
   const bool known = before.rotors_differ();
-  const std::uint64_t seed = settings_.seed;
+  const std::uint64_t seed = data.settings().seed;
   std::mt19937_64 for_correlation = random_numbers(seed, ScatterDraws::kCorrelation),
                   for_rotors = random_numbers(seed, ScatterDraws::kRotors),
                   for_runs = random_numbers(seed, ScatterDraws::kRuns),
@@ -125,13 +93,13 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
                   for_contrasts = random_numbers(seed, ScatterDraws::kContrasts);
   // While a rotor that scatters more was taken for one like the others, the best curve had a part of its
   // scatter.
-  const ScatterBeside beside = scatter_beside(curves, known ? critical_ : 0, for_runs);
+  const ScatterBeside beside = scatter_beside(data, found, curves, known ? found.critical : 0, for_runs);
   const std::vector<Components>& columns = beside.columns;
-  const Components y = difference(y_, fit_.linear.offset);
-  Observations scattered = observations_;
+  const Components y = difference(data.y(), found.fit.linear.offset);
+  Observations scattered = data.observations();
   RunScatter& scatter = scattered.scatter = {.by_condition = beside.scatter.by_condition};
   const auto left_beside = [&](const std::vector<Components>& of) {
-    return without(y, of, fit_amplitudes(scattered, y, of, beside.scatter.variances, rows_).amplitude);
+    return without(y, of, fit_amplitudes(scattered, y, of, beside.scatter.variances, data.rows()).amplitude);
   };
   const Components residual = left_beside(columns);
   // What a condition does to single rotors, or to them in pairs, is no scatter.
@@ -140,25 +108,44 @@ bool Search::begin_with_scatter_of(const CurveScan& curves) {
     with_each_rotor.insert(with_each_rotor.end(), curve.columns.begin(), curve.columns.end());
   const Components of_rotors = left_beside(with_each_rotor);
   // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter.
-  const Eigen::VectorXd contrasts = contrast_scatter(scattered, rows_, of_rotors, for_contrasts);
-  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, rows_, of_rotors, for_rotors);
-  const MixedModel model(scattered, rows_);
+  const Eigen::VectorXd contrasts = contrast_scatter(scattered, data.rows(), of_rotors, for_contrasts);
+  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, data.rows(), of_rotors, for_rotors);
+  const MixedModel model(scattered, data.rows());
   const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);
   scatter.run_correlation = run_correlation(scattered, model, variances, residual, for_correlation);
-  scatter.runs = run_scatter(observations_, run_sizes(model, variances, y, columns, for_runs));
+  scatter.runs = run_scatter(data.observations(), run_sizes(model, variances, y, columns, for_runs));
   // The best of many curves makes half of what a dozen sessions differ by, whatever that is.
   if (contrasts.size() == 0)
-    scatter.sessions = rotor_sessions(scattered, rows_, left_beside(fit_.linear.columns), for_sessions);
+    scatter.sessions =
+        rotor_sessions(scattered, data.rows(), left_beside(found.fit.linear.columns), for_sessions);
   scatter.contrasts = contrasts;  // after what takes the differences for one stratum
   if (are_alike(scatter.rotors, before.rotors) && are_alike(contrasts, before.contrasts) &&
       scatter.sessions.rotors == before.sessions.rotors &&
       (before.runs.size() > 0) == (scatter.runs.size() > 0) &&
       before.by_condition.names == scatter.by_condition.names &&
       (known || scatter.run_correlation == before.run_correlation))
-    return false;
-  observations_.scatter = scatter;
-  begin();
-  return true;
+    return std::nullopt;
+  return std::move(scatter);
+}
+
+std::optional<SessionScatter> session_scatter_is_large(const SearchData& data, const JointFit& fit) {
+  constexpr double kOneSided = 0.025;  // a lower bound of 95 %
+  const RotorSessions& unlike = data.observations().scatter.sessions;
+  std::optional<SessionScatter> of_rotor;
+  for (std::size_t s = 0; s < data.mixed().strata().size(); ++s) {
+    if (!data.mixed().strata()[s].means()) continue;
+    double below = 0;
+    for (std::size_t r = 0; r < fit.variances.ratio_probability[s].size(); ++r) {
+      if (kRatios[r] <= data.settings().session_ratio * data.settings().session_ratio)
+        below += fit.variances.ratio_probability[s][r];
+    }
+    if (below >= kOneSided) continue;
+    const Eigen::Index mode = data.mixed().strata()[s].first_mode;  // the first is what all have in common
+    const bool own = unlike.rotors.size() == 1 && mode > 0 && mode < unlike.alone;
+    if (!own) return SessionScatter{-1, below};
+    of_rotor = SessionScatter{unlike.rotors[0], below};
+  }
+  return of_rotor;
 }
 
 }  // namespace tunnelrig

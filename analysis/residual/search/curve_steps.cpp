@@ -1,0 +1,138 @@
+#include "analysis/residual/search/curve_steps.h"
+
+#include "analysis/residual/observations/condition_values.h"
+#include "analysis/residual/search/curve_scan.h"
+#include "analysis/residual/search/curve_work.h"
+#include "analysis/residual/search/effect_steps.h"
+#include "analysis/residual/search/fits.h"
+#include "analysis/residual/search/older_effects.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+void add_curve(const SearchData& data, Found& found, const Curve& curve, double p) {
+  MeanModel model = found.fit.model;
+  model.curves.push_back(curve);
+  found.add_curve({.curve = curve, .p = p, .instead_of = {}},
+                  fit_jointly(data.observations(), model, data.rows()));
+}
+
+void set_curve(const SearchData& data, Found& found, std::size_t c, const Curve& form) {
+  MeanModel model = found.fit.model;
+  model.curves[c] = form;
+  found.set_curve(c, form, fit_jointly(data.observations(), model, data.rows()));
+}
+
+/// Takes accepted effect t out, and gives the newest curve the straight part that no name takes any more.
+/// `without`: the fit without the effect.
+void give_way_to_curve(const SearchData& data, Found& found, std::size_t t, const JointFit& without) {
+  found.curves.back().instead_of.push_back(found.accepted[t].term.effect->name);
+  found.drop(t, without);
+  const std::size_t newest = found.curves.size() - 1;
+  set_curve(data, found, newest, with_trend(found.curves[newest].curve));
+}
+
+/// A name whose work a curve does as well was the wrong name for that curve.
+void drop_what_a_curve_replaces(const SearchData& data, Found& found, Questions& questions) {
+  for (std::size_t t = found.accepted.size(); t-- > 0;) {
+    const Term term = found.accepted[t].term;
+    // Those of groups stand in the baseline; that forces go with the square of the speed is not in doubt.
+    if (term.per_group || term.effect->theory_only) continue;
+    // What two conditions do together is not what one of them does.
+    const bool product = found.curves.back().curve.strength.has_value();
+    const JointFit without = fit_without(data, found.fit, t);
+    if (outshone_by_curve(data, found, term)) {
+      give_way_to_curve(data, found, t, without);
+    } else if (!product && !is_still_found(data, found, term, without, questions)) {
+      found.curves.back().could_be.push_back(term);
+      found.drop(t, without);
+    }
+  }
+}
+
+/// Of the smooth forms of what a curve over the runs has found: as many columns as they ask for.
+Curve best_of(const std::vector<Curve>& forms, const SearchData& data, const JointFit& without) {
+  std::vector<Candidate> candidates;
+  for (const Curve& form : forms) candidates.push_back(as_candidate(form));
+  const auto fits = CandidateScan(data.mixed(), without.linear.columns, candidates)
+                        .fit(difference(data.y(), without.linear.offset));
+  const Covariate measured =
+      as_measured_along(*data.observations().find(forms[0].covariate), forms.back().shape);
+  const double n = places_on_range(measured, data.rows(), forms[0].rotor);
+  const auto criterion = [&](std::size_t i) {   // Hurvich & Tsai 1989
+    const auto k = static_cast<double>(i + 2);  // columns and a constant
+    return 2 * (k + 1) * n / std::max(n - k - 2, 1.0) - 2 * fits[i].likelihood_ratio;
+  };
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < forms.size(); ++i)
+    if (criterion(i) < criterion(best)) best = i;
+  return forms[best];
+}
+
+}  // namespace
+
+void add_curves(SearchState& state, const CurveScan& first) {
+  const int most = state.data.settings().most_curves;
+  bool added = most > 0 && add_best_curve(state, first);
+  while (added) {
+    place_steps(state.data, state.found);
+    drop_what_a_curve_replaces(state.data, state.found, state.questions);
+    add_effects(state);
+    added = static_cast<int>(state.found.curves.size()) < most &&
+            add_best_curve(state, scan_curves(state.data, state.found));
+  }
+}
+
+bool add_best_curve(SearchState& state, const CurveScan& curves) {
+  state.data.settings().progress("looking for structure without a name");
+  const auto& [scan, tried] = curves;
+  if (tried.empty()) return false;
+  const std::size_t best = scan.order[0];
+  NullMaxima maxima = state.questions.maxima_of(state.data, state.found.fit, scan, Draws::kCurves);
+  const double p = maxima.p(scan.fits[best].evidence);
+  Round round;
+  round.observed = scan.fits[best].evidence;
+  round.null_maxima = maxima.values();
+  round.outcome = fmt::format("p = {:.3g} for {}", p, tried[best].label());
+  state.record.curve_rounds.push_back(std::move(round));
+  if (p > state.data.settings().alpha) return false;
+  add_curve(state.data, state.found, tried[everywhere_instead(state.data, state.found.fit, curves)], p);
+  return true;
+}
+
+void smooth_curves(const SearchData& data, Found& found, std::size_t first) {
+  for (std::size_t c = first; c < found.curves.size(); ++c) {
+    const std::vector<Curve> forms = smooth_forms(data.observations(), found.curves[c].curve, data.rows());
+    if (forms.empty()) continue;
+    MeanModel rest = found.fit.model;
+    rest.curves.erase(rest.curves.begin() + static_cast<std::ptrdiff_t>(c));
+    const JointFit without = fit_jointly(data.observations(), rest, data.rows());
+    set_curve(data, found, c, best_of(forms, data, without));
+  }
+}
+
+bool bends_away(const SearchData& data, const Found& found, std::size_t t, Questions& questions) {
+  const Term& term = found.accepted[t].term;
+  if (term.per_group || term.effect->theory_only) return false;
+  const CurveScan bends = scan_bends(data, found, term);
+  if (bends.tried.empty()) return false;
+  const std::size_t best = bends.scan.order[0];
+  const double p_allowed = data.settings().alpha / 2;  // one question of each name, not the largest of many
+  SearchSettings enough = data.settings();             // data sets for such a p
+  enough.simulations = std::max(enough.simulations, static_cast<std::size_t>(std::ceil(1 / p_allowed)));
+  const double p = questions.maxima_of(data, found.fit, bends.scan, Draws::kBends, enough)
+                       .p(bends.scan.fits[best].evidence);
+  if (p > p_allowed) return false;
+  Found bent = found;
+  add_curve(data, bent, bends.tried[best], p);
+  return outshone_by_curve(data, bent, bent.accepted[t].term);
+}
+
+}  // namespace tunnelrig

@@ -1,0 +1,23 @@
+// What an effect must be to be found.
+#pragma once
+
+#include "analysis/residual/search/found.h"
+#include "analysis/residual/search/scan.h"
+
+#include <map>
+#include <string>
+
+namespace tunnelrig {
+
+struct Detectable {
+  double largest = 0;                       // of all
+  std::map<std::string, double> by_effect;  // by name
+};
+
+/// Rms, in y, at which an effect reaches the critical evidence in four of five data sets drawn from the null
+/// model (the typical one of its forms and shapes): of what varies from session to session far more is needed
+/// than of what varies from run to run. `scan`: of all effects, on top of no model. `otherwise`: the
+/// largest, where none of them can be told.
+Detectable detectable_by(const SearchData& data, const Found& found, const Scan& scan, double otherwise);
+
+}  // namespace tunnelrig

@@ -1,0 +1,21 @@
+// Effects that do as well as what was found.
+#pragma once
+
+#include "analysis/residual/search/found.h"
+#include "analysis/residual/search/questions.h"
+
+#include <cstddef>
+#include <vector>
+
+namespace tunnelrig {
+
+/// One way of each other effect that α would let in in place of effect t and that predicts unseen blocks
+/// about as well.
+std::vector<Ranked> rivals_of(const SearchData& data, const Found& found, std::size_t t);
+
+/// Effects that step 3 would accept in the newest curve's place, and that predict unseen blocks about as
+/// well. `without`: the fit without the curve.
+std::vector<Term> names_of_newest_curve(const SearchData& data, const Found& found, const JointFit& without,
+                                        Questions& questions);
+
+}  // namespace tunnelrig
