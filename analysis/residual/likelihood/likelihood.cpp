@@ -24,8 +24,12 @@ struct CandidateScan::Impl {
   using State = StrataFit::State;
 
   const MixedModel& model;
-  const std::vector<Candidate> candidates;
-  const std::vector<Index> widths;  // columns of each
+  struct Prior {
+    int sign;
+    double weight;
+  };
+  const std::vector<Prior> candidates;  // whose columns, of many runs, are kept once: in `columns`
+  const std::vector<Index> widths;      // columns of each
   const ScanProducts columns;
   const Index adopted, all_adopted;  // beside the candidates; with those that were taken out of all
   const StrataFit strata;
@@ -34,9 +38,9 @@ struct CandidateScan::Impl {
 
   Impl(const MixedModel& m, const std::vector<Components>& adopted_columns, const std::vector<Candidate>& all)
       : model(m),
-        candidates(all),
+        candidates(priors_of(all)),
         widths(widths_of(all)),
-        columns(m, adopted_columns, candidates),
+        columns(m, adopted_columns, all),
         adopted(columns.adopted()),
         all_adopted(static_cast<Index>(adopted_columns.size())),
         strata(m, columns, widths) {
@@ -50,6 +54,12 @@ struct CandidateScan::Impl {
   void check_width(Index beside_adopted) const {
     if (all_adopted + beside_adopted > kMostColumns)
       throw std::length_error(fmt::format("a model of more than {} columns", kMostColumns));
+  }
+
+  static std::vector<Prior> priors_of(const std::vector<Candidate>& all) {
+    std::vector<Prior> result;
+    for (const Candidate& each : all) result.push_back({each.sign, each.weight});
+    return result;
   }
 
   static std::vector<Index> widths_of(const std::vector<Candidate>& all) {
@@ -151,6 +161,39 @@ struct CandidateScan::Impl {
     return result;
   }
 
+  /// As many data sets as fit into 300 MB: of ten thousands of runs not all.
+  std::size_t sets_at_once(std::size_t count) const {
+    constexpr std::size_t kNumbers = 40'000'000, kFewest = 10;
+    std::size_t numbers = 0;  // of a data set
+    for (const MixedModel::Stratum& stratum : model.strata())
+      numbers += model.rows().size() * static_cast<std::size_t>(stratum.modes);
+    return std::min(count, std::max(kFewest, kNumbers / std::max<std::size_t>(numbers, 1)));
+  }
+
+  /// Of each data set the largest evidence among the candidates.
+  std::vector<double> maxima_of(const Data& sets) const {
+    const auto count = static_cast<std::size_t>(sets[0][0].squares.size());
+    std::vector<double> maxima(count, 0.0);
+    in_two_threads(count, [&](std::size_t set) {
+      const State state = strata.best_without(sets, static_cast<Index>(set));
+      const Eigen::VectorXd most = most_evidence(sets, static_cast<Index>(set), state);
+      std::vector<std::size_t> order(candidates.size());
+      std::iota(order.begin(), order.end(), 0U);
+      const auto of = [&](std::size_t i) { return most(static_cast<Index>(i)); };
+      std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return of(a) > of(b); });
+      for (const std::size_t i : order) {
+        if (of(i) <= maxima[set]) break;
+        // Within a factor of a hundred of the largest so far, a better variance may still make it the
+        // largest.
+        const double threshold = std::max(0.5, maxima[set] - 2);
+        maxima[set] = std::max(
+            maxima[set],
+            fit_candidate(sets, static_cast<Index>(set), static_cast<int>(i), state, threshold).evidence);
+      }
+    });
+    return maxima;
+  }
+
   /// One data set with so much of a candidate's column added to it.
   Data planted(const Data& data, Index set, std::size_t candidate, double amplitude) const {
     const Index column = columns.first(candidate);
@@ -239,25 +282,13 @@ std::vector<CandidateFit> CandidateScan::fit(const Components& y) const {
 
 std::vector<double> CandidateScan::simulated_maxima(const NullFit& null, std::size_t count,
                                                     std::mt19937_64& random) const {
-  const ScanProducts::Data products = impl_->columns.times(impl_->simulated(null, count, null.sizes, random));
-  std::vector<double> maxima(count, 0.0);
-  in_two_threads(count, [&](std::size_t set) {
-    const StrataFit::State state = impl_->strata.best_without(products, static_cast<Index>(set));
-    const Eigen::VectorXd most = impl_->most_evidence(products, static_cast<Index>(set), state);
-    std::vector<std::size_t> order(impl_->candidates.size());
-    std::iota(order.begin(), order.end(), 0U);
-    const auto of = [&](std::size_t i) { return most(static_cast<Index>(i)); };
-    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return of(a) > of(b); });
-    for (const std::size_t i : order) {
-      if (of(i) <= maxima[set]) break;
-      // Within a factor of a hundred of the largest so far, a better variance may still make it the largest.
-      const double threshold = std::max(0.5, maxima[set] - 2);
-      maxima[set] = std::max(
-          maxima[set],
-          impl_->fit_candidate(products, static_cast<Index>(set), static_cast<int>(i), state, threshold)
-              .evidence);
-    }
-  });
+  const std::size_t together = impl_->sets_at_once(count);
+  std::vector<double> maxima;
+  while (maxima.size() < count) {
+    const std::vector<double> some = impl_->maxima_of(impl_->columns.times(
+        impl_->simulated(null, std::min(together, count - maxima.size()), null.sizes, random)));
+    maxima.insert(maxima.end(), some.begin(), some.end());
+  }
   return maxima;
 }
 

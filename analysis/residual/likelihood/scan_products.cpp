@@ -74,16 +74,19 @@ void ScanProducts::project(std::size_t stratum, const std::vector<const Componen
       columns.push_back(static_cast<Index>(i));
       not_0.push_back(items[i]);
     }
-  const Stacked stacked = model_.stack(stratum, not_0);
-  Stacked left = stacked;
+  Stacked left = model_.stack(stratum, not_0);
+  const Eigen::VectorXd squares = left.colwise().squaredNorm();
   model_.project(stratum, 0, left);
   std::vector<Index> kept, used;
   for (Index c = 0; c < left.cols(); ++c)
-    if (left.col(c).squaredNorm() > kNothing * stacked.col(c).squaredNorm()) {
+    if (left.col(c).squaredNorm() > kNothing * squares(c)) {
       kept.push_back(c);
       used.push_back(columns[static_cast<std::size_t>(c)]);
     }
-  projected_.emplace_back(left(Eigen::all, kept));
+  if (static_cast<Index>(kept.size()) == left.cols())
+    projected_.push_back(std::move(left));
+  else
+    projected_.emplace_back(left(Eigen::all, kept));
   used_.push_back(std::move(used));
 }
 

@@ -45,6 +45,29 @@ bool clips(const RunStatistics& run) {
                              [&](const ChannelStatistics& c) { return clip_fraction(run, c) > kClips; });
 }
 
+/// Hum of the grid that the campaign says it is not on: a line without another name, at 50 or at 60 Hz, in
+/// most runs.
+void warn_of_another_grid(const std::vector<const RunStatistics*>& of_rows, const Daq& daq,
+                          Observations& observations) {
+  if (!daq.mains_hz) return;
+  for (const double grid_hz : {50.0, 60.0}) {
+    if (may_be_hum(grid_hz, daq.sample_rate_hz, daq.mains_hz)) continue;
+    const auto hums = [&](const RunStatistics* run) {
+      return run != nullptr && std::ranges::any_of(run->channels, [&](const ChannelStatistics& channel) {
+               return std::ranges::any_of(channel.lines, [&](const SpectralLine& line) {
+                 return line.name.empty() && may_be_hum(line.frequency_hz, daq.sample_rate_hz, grid_hz);
+               });
+             });
+    };
+    const auto runs = std::ranges::count_if(of_rows, hums);
+    if (2 * runs > std::ssize(of_rows))
+      observations.left_out.push_back(fmt::format(
+          "{} of {} runs have a line at {:g} Hz that is no multiple of the shaft's: mains_hz = {:g} "
+          "in campaign.toml may be wrong, and hum is counted in mains_amplitude_V at that alone",
+          runs, of_rows.size(), grid_hz, *daq.mains_hz));
+  }
+}
+
 }  // namespace
 
 double mains_amplitude_V(const ChannelStatistics& channel, const Daq& daq) {
@@ -77,6 +100,7 @@ void add_raw_conditions(const std::vector<const RunStatistics*>& of_rows, const 
   add("alias_amplitude_V",
       [](OfRun run, OfChannel channel) { return clips(run) ? kUnknown : alias_amplitude_V(channel); });
   add("vibration_amplitude_V", [](OfRun, OfChannel channel) { return vibration_amplitude_V(channel); });
+  warn_of_another_grid(of_rows, daq, observations);
   const auto clipped =
       std::ranges::count_if(of_rows, [](const RunStatistics* run) { return run && clips(*run); });
   if (clipped > 0 && observations.find("alias_amplitude_V")->derived)

@@ -138,7 +138,13 @@ StructureLeft structure_left(const Attribution& before, const JointFit& whole, c
     const JointFit without = found.fit;
     if (!add_best_curve(state, scan_curves(data, found))) break;
     left.bent.merge(outshone(data, found));
-    found.curves.back().could_be = names_of_newest_curve(data, found, without, state.questions);
+    std::vector<Term> names = names_of_newest_curve(data, found, without, state.questions);
+    std::erase_if(names, [&](const Term& term) {  // with its own size it would be outside of physics here too
+      return std::ranges::any_of(before.beyond_bounds, [&](const BeyondBounds& refused) {
+        return refused.term.effect->name == term.effect->name;
+      });
+    });
+    found.curves.back().could_be = std::move(names);
   }
   smooth_curves(data, found, before.curves.size());
   left.curves = {found.curves.begin() + std::ssize(before.curves), found.curves.end()};
