@@ -2,6 +2,8 @@
 
 #include "analysis/residual/likelihood/in_two_threads.h"
 
+#include <utility>
+
 namespace tunnelrig {
 
 using Eigen::Index;

@@ -130,6 +130,21 @@ TEST_F(CampaignMeaning, OneLocationHasOneCoefficientHoweverItIsWritten) {
   EXPECT_EQ(observe_campaign(data, {}).groups(), 3);
 }
 
+/// Hum at 50 Hz where the campaign says 60 is no line of the mains, and would be seen by nothing.
+TEST_F(CampaignMeaning, AHumOfTheOtherGridIsSaid) {
+  add_sessions(Tares::kNone, 0);
+  for (auto& [run, statistics] : data.statistics)
+    statistics.channels[0].lines = {{.frequency_hz = 50.02, .amplitude_V = 0.012}};
+  const auto said = Contains(HasSubstr("a line at 50 Hz that is no multiple of the shaft's: mains_hz = 60"));
+  data.info.daq.mains_hz = 60;
+  EXPECT_THAT(observe_campaign(data, {}).left_out, said);
+  data.info.daq.mains_hz = 50;
+  EXPECT_THAT(observe_campaign(data, {}).left_out, Not(said));
+  data.info.daq.mains_hz = 60;
+  for (auto& [run, statistics] : data.statistics) statistics.channels[0].lines[0].name = "shaft";
+  EXPECT_THAT(observe_campaign(data, {}).left_out, Not(said));
+}
+
 /// What changes within a run goes by the clock, whichever frames were lost.
 TEST_F(CampaignMeaning, LostFramesAreAPartOfARunsTime) {
   add_sessions(Tares::kNone, 0);

@@ -164,5 +164,29 @@ TEST_F(ExplainTest, ANameAndACurveOverTheLikeThatCancelAreNoName) {
   }
 }
 
+/// That it is the same in all sessions is what makes it a course, and no reason to take it for their scatter.
+TEST_F(ExplainTest, ACourseThatEveryRunHasIsNoScatterOfSessions) {
+  for (const double times : {0.0, 20.0}) {
+    Observations o = test::simulate(
+        {.runs_of_block = std::vector<int>(7, 11), .channels = 4, .shapes = 6, .session_ratio = 0}, random);
+    o.shape[0].array() += times * 0.002;
+    o.shape[2].array() += times * 0.002 / 9;
+    const Explanation e = explained(o);
+    ASSERT_EQ(e.unknown.size(), times > 0 ? 1u : 0u) << explanation_text(e);
+    if (times > 0) {
+      EXPECT_EQ(e.unknown[0].covariate, "time_in_run");
+      EXPECT_FALSE(e.unknown[0].by_sealed_too) << "five open sessions show it";
+    }
+  }
+}
+
+TEST_F(ExplainTest, WhereOneNameAloneIsTestedItIsSaid) {
+  Explanation e = explained(observations(16));
+  ASSERT_TRUE(e.adopted.empty());
+  e.verdict = "no_structure";
+  e.detectable_by_effect = {{"nonlinearity", 0.1}};
+  EXPECT_THAT(explanation_text(e), HasSubstr("these data test no name but nonlinearity"));
+}
+
 }  // namespace
 }  // namespace tunnelrig

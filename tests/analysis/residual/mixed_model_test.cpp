@@ -258,6 +258,30 @@ TEST(RunCorrelation, IsFoundWhereItIsAndNowhereElse) {
   }
 }
 
+/// A model of independent runs takes a part of the correlation for sessions that differ.
+TEST(RunCorrelation, IsNotHiddenByTheSessionVarianceOfIndependentRuns) {
+  SCOPED_TRACE(testing::Message() << "seed " << test::seed());
+  std::mt19937_64 random(test::seed());
+  constexpr int kCampaigns = 40;
+  constexpr double kTruth = 0.6;
+  std::array<double, 2> mean = {0, 0};
+  for (int i = 0; i < kCampaigns; ++i) {
+    const Observations o = test::simulate({.runs_of_block = std::vector<int>(18, 12),
+                                           .groups = 26,
+                                           .channels = 4,
+                                           .session_ratio = 0,
+                                           .run_correlation = kTruth},
+                                          random);
+    const MixedModel model(o, o.all_rows());
+    const Components y = {o.y};
+    const std::array<double, 2> found =
+        run_correlation(o, model, CandidateScan(model, {}, {}).null_fit(y), y, random);
+    for (std::size_t side = 0; side < 2; ++side) mean[side] += found[side] / kCampaigns;
+  }
+  EXPECT_NEAR(mean[0], kTruth, 0.06) << "of one mode the standard error is 0.015";
+  EXPECT_NEAR(mean[1], kTruth, 0.03);
+}
+
 /// The leverage is the diagonal of the baseline's hat matrix, in whitened responses.
 TEST(MixedModel, LeverageIsThatOfDenseAlgebra) {
   std::mt19937_64 random{test::seed()};

@@ -98,6 +98,22 @@ TEST_F(TableDoubts, AFewRowsTellAFloorAsWellAsTheyCan) {
   EXPECT_LE(beyond, 5) << "binomial (80, 0.02): beyond 5 in 0.7 % of cases";
 }
 
+/// Where a few rows are all of the error, its interval reaches as far as any floor.
+TEST(Doubts, AFloorFarAboveTheErrorIsSaid) {
+  const auto said = Contains(HasSubstr("the noise floor is far above the error"));
+  for (const double floor : {1.5, 60.0}) {
+    Explanation e;
+    e.noise_floor = floor;
+    e.before.held_out_rmse = e.after.held_out_rmse = 1;
+    e.after.held_out_high = 100;
+    warn_of_doubts(e);
+    if (floor > 3)
+      EXPECT_THAT(e.warnings, said);
+    else
+      EXPECT_THAT(e.warnings, testing::Not(said));
+  }
+}
+
 /// One gust in which one row is far off tells nothing of what wind does, whichever rows are held out.
 TEST_F(TableDoubts, OneRunFarOutOnACondition) {
   constexpr int kTables = 12;

@@ -5,6 +5,7 @@
 #include "analysis/residual/likelihood/curves.h"
 #include "support/message_of.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -235,6 +236,24 @@ TEST_F(TablesTest, CurvesDoNotSwingInAGap) {
   for (const Curve& curve : curves_to_try(o, o.all_rows()))
     if (curve.covariate == "V") most = std::max(most, curve.columns.size());
   EXPECT_EQ(most, 2u);
+}
+
+/// Of few settings a bend alone has no straight course, and levels take up many columns.
+TEST_F(TablesTest, FiveSettingsShowAStraightCourse) {
+  for (const int settings : {4, 5}) {
+    std::string csv = "b,V,y\n";
+    for (int r = 0; r < 96; ++r)
+      csv += fmt::format("{},{},{}\n", r / 8, 8 + r % settings, 5 * (1 + 0.003 * scatter(random)));
+    const Observations o = observed(csv,
+                                    "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+                                    "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\n");
+    const std::vector<Curve> curves = curves_to_try(o, o.all_rows());
+    EXPECT_EQ(std::ranges::any_of(curves,
+                                  [](const Curve& curve) {
+                                    return curve.covariate == "V" && curve.shape == CurveShape::kWaves;
+                                  }),
+              settings == 5);
+  }
 }
 
 }  // namespace
