@@ -191,7 +191,7 @@ class Fitness : public Findings {
   void thrusts() {
     const auto doubt = implausible_thrust(data_);
     if (!doubt) return;
-    if (doubt->too_much)
+    if (doubt->certain)
       problem("thrusts", doubt->found, doubt->advice);
     else
       note("thrusts", doubt->found, doubt->advice);
