@@ -170,9 +170,9 @@ void check_statistics(const RunStatistics& statistics, const CampaignInfo& info,
     if (channel.stuck() && run.kind == RunKind::kThrust && !allow_stuck) {
       throw InputError::at(
           "runs.csv", run.line,
-          "run {}: channel {} of {} is stuck at {:g} V for the whole run; take the run out of runs.csv, "
+          "run {}: channel {} of {} is stuck at {:g} V for the {}; take the run out of runs.csv, "
           "or import with --allow-stuck to keep it marked",
-          run.run, c + 1, run.raw, channel.lowest_V);
+          run.run, c + 1, run.raw, channel.lowest_V, statistics.frames == 1 ? "one frame" : "whole run");
     }
   }
 }
