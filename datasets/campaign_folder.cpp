@@ -386,11 +386,13 @@ ImportSummary import_campaign_folder(const fs::path& folder, const fs::path& fil
   return summary;
 }
 
-void export_campaign_folder(const CampaignFile& file, const fs::path& folder, const Progress& progress) {
+std::vector<std::string> export_campaign_folder(const CampaignFile& file, const fs::path& folder,
+                                                const Progress& progress) {
   const Snapshot snapshot(file);
   StagedOutput staged(folder, StagedOutput::Kind::kFolder);
   staged.write([&] { write_folder(file, staged.path(), progress); });
   staged.publish();
+  return unfinished_runs(file);
 }
 
 }  // namespace tunnelrig
