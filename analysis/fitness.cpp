@@ -3,6 +3,7 @@
 #include "analysis/implausible_thrust.h"
 #include "analysis/misread_runs.h"
 #include "analysis/reduction.h"
+#include "analysis/spectrum.h"
 #include "datasets/error.h"
 #include "datasets/recorded_rate.h"
 
@@ -25,7 +26,7 @@ std::string with_share(const std::string& name, std::uint64_t frames, std::uint6
 
 /// Runs, or channels of runs, by what is wrong with them.
 struct ChannelFaults {
-  Names stuck, dead, clipped, overloaded;
+  Names single, stuck, dead, clipped, overloaded;
   Names flagged, erroneous, pattern;  // by the board itself
 
   void add_flags(const std::string& run, const Ledger& ledger) {
@@ -86,8 +87,8 @@ class Fitness : public Findings {
       return;
     }
     note("tares",
-         fmt::format("none in {}: their zero is the calibration's, extrapolated from {:.1f} N",
-                     without.text(), lowest_calibrated_N()),
+         fmt::format("none in {}: their zero is the calibration's, extrapolated{}", without.text(),
+                     data_.certificate ? fmt::format(" from {:.1f} N", lowest_calibrated_N()) : ""),
          "record a tare (motors stopped) before and after each session: `tunnelrig log --kind tare`");
   }
 
@@ -111,6 +112,8 @@ class Fitness : public Findings {
       problem("channels", what + names.text(), advice);
       well = false;
     };
+    report(faults.single,
+           "one frame only, too short for a mean: ", "record these runs again, or exclude them");
     report(faults.stuck, "stuck, never change: ", "check cell, amplifier and plug; record these runs again");
     report(faults.dead, "dead, less noise than a converter has: ", "check cell, amplifier and plug");
     report(faults.clipped, "clipped: ", "lower the amplifier's gain; clipped means are biased");
@@ -154,11 +157,9 @@ class Fitness : public Findings {
         far.emplace_back(by, fmt::format("{} ({:.0f})", run.run, *read));
       const auto statistics = data_.statistics.find(run.run);
       if (statistics == data_.statistics.end()) continue;
-      for (const ChannelStatistics& channel : statistics->second.channels) {
-        if (!channel.shaft_hz || std::abs(*channel.shaft_hz * 60 / *read - 1) < kTachometerAgrees) continue;
-        disagree.add(fmt::format("{} ({:.0f} against {:.0f})", run.run, *channel.shaft_hz * 60, *read));
-        break;
-      }
+      const auto shaft_hz = middle_shaft_hz(statistics->second);
+      if (shaft_hz && std::abs(60 * *shaft_hz - *read) > tolerance_rpm(statistics->second, *read))
+        disagree.add(fmt::format("{} ({:.0f} against {:.0f})", run.run, 60 * *shaft_hz, *read));
     }
     std::ranges::stable_sort(far, std::greater{}, &std::pair<double, std::string>::first);
     Names off;
@@ -191,7 +192,7 @@ class Fitness : public Findings {
   void thrusts() {
     const auto doubt = implausible_thrust(data_);
     if (!doubt) return;
-    if (doubt->too_much)
+    if (doubt->certain)
       problem("thrusts", doubt->found, doubt->advice);
     else
       note("thrusts", doubt->found, doubt->advice);
@@ -224,6 +225,13 @@ class Fitness : public Findings {
   }
 
  private:
+  /// Short runs have wide bins, and a line is not known better than a part of one.
+  double tolerance_rpm(const RunStatistics& statistics, double speed_rpm) const {
+    const std::size_t window = welch_window(statistics.frames);
+    const double bin_rpm = window == 0 ? 0 : 60 * data_.info.daq.sample_rate_hz / static_cast<double>(window);
+    return std::max(kTachometerAgrees * speed_rpm, 2 * kLineError_bins * bin_rpm);
+  }
+
   ChannelFaults channel_faults() const {
     ChannelFaults faults;
     for (const Run& run : data_.runs) {
@@ -232,6 +240,10 @@ class Fitness : public Findings {
       const auto raw = data_.raw.find(run.run);
       if (raw != data_.raw.end())
         if (const auto ledger = ledger_of(file_, raw->second.id)) faults.add_flags(run.run, *ledger);
+      if (statistics->second.frames == 1) {  // it cannot change, whatever the cell does
+        faults.single.add(run.run);
+        continue;
+      }
       const bool counts = raw != data_.raw.end() && is_counts(raw->second.format.type);
       for (int rotor = 0; rotor < data_.info.rig.rotors; ++rotor)
         add_faults(run, rotor, statistics->second, counts, faults);

@@ -72,6 +72,34 @@ double median_of_speeds(const Reduction& reduction) {
   return upper_median(std::move(speeds));
 }
 
+/// A rotor that pulls backwards in most runs. One that stands, beside others that turn, reads a little of
+/// either sign; a run whose total is not above 0 is not reduced.
+std::optional<ImplausibleThrust> wrong_sign(const CampaignData& data, const Reduction& reduction) {
+  constexpr double kClear = 0.2;  // of the run's largest
+  std::string found;
+  for (std::size_t rotor = 0; rotor < static_cast<std::size_t>(data.info.rig.rotors); ++rotor) {
+    std::vector<double> backwards_N, largest_N;
+    for (const RunCoefficients& run : reduction.runs) {
+      const double most_N = std::ranges::max(run.thrust_N);
+      if (most_N < kLeastOverMostThrust * most_rotor_thrust_N(data.info.rig, run.speed_rpm)) continue;
+      if (run.thrust_N[rotor] >= -kClear * most_N) continue;
+      backwards_N.push_back(run.thrust_N[rotor]);
+      largest_N.push_back(most_N);
+    }
+    const std::size_t runs = backwards_N.size();
+    if (2 * runs <= reduction.runs.size()) continue;
+    found += fmt::format("{}rotor {} gives {:.3g} N where another gives {:.3g} N, so in {} of {} runs",
+                         found.empty() ? "" : "; ", rotor + 1, upper_median(std::move(backwards_N)),
+                         upper_median(std::move(largest_N)), runs, reduction.runs.size());
+  }
+  if (found.empty()) return {};
+  return ImplausibleThrust{
+      found,
+      "is its cell wired, or calibrated, with the wrong sign? Until that is mended neither "
+      "U nor C_T means anything",
+      true};
+}
+
 double of_one_rotor(double c_t, Convention convention) {
   Rig rig;
   rig.rotors = 1;
@@ -85,7 +113,7 @@ std::optional<ImplausibleThrust> implausible_thrust(const CampaignData& data, co
   const auto locations = rotors_by_location(data, reduction);
   const LargestThrust largest = largest_of(locations);
   const bool too_much = largest.of_most > 1, too_little = largest.of_most < kLeastOverMostThrust;
-  if (!too_much && !too_little) return {};
+  if (!too_much && !too_little) return wrong_sign(data, reduction);
   const double speed_rpm = median_of_speeds(reduction);
   const double limit_N =
       (too_much ? 1 : kLeastOverMostThrust) * most_rotor_thrust_N(data.info.rig, speed_rpm);

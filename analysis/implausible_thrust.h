@@ -1,4 +1,5 @@
-// Thrusts that no rotor of the rig's size and speed gives: what a unit mistake makes of a campaign.
+// Thrusts that no rotor of the rig's size and speed gives, or none beside the others: what a mistake of a
+// unit or a sign makes of a campaign.
 #pragma once
 
 #include "analysis/campaign_data.h"
@@ -13,11 +14,12 @@ namespace tunnelrig {
 struct ImplausibleThrust {
   std::string found;   // place, value and rule
   std::string advice;  // what is likely wrong
-  bool too_much;       // a mistake for certain; too little may be a rig at rest
+  bool certain;        // a mistake; too little may be a rig at rest
 };
 
 /// Too much is said of any rotor at any location, by its mean thrust there. Too little is said only where
-/// every rotor at every location has it: rotors may stand, or turn without blades.
+/// every rotor at every location has it: rotors may stand, or turn without blades. A sign is said to be wrong
+/// where, in most runs, a rotor pulls backwards by more than a fifth of what another gives forwards.
 std::optional<ImplausibleThrust> implausible_thrust(const CampaignData& data, const Reduction& reduction);
 
 /// Of what the thesis's model makes of the campaign; nothing where it cannot be reduced.

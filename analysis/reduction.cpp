@@ -68,6 +68,7 @@ LeftOutRun why_not(const CampaignData& data, const Run& run, const RawRun& raw) 
     return {run.run, "no statistics are stored; `reduce --from-raw` computes them"};
   if (statistics->second.hash != raw.hash)
     return {run.run, "its statistics are of other raw data; `reduce --from-raw` computes them anew"};
+  if (statistics->second.frames == 1) return {run.run, "it has one frame only"};
   for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
     if (statistics->second.channels[static_cast<std::size_t>(rotor)].stuck())
       return {run.run, fmt::format("channel {} is stuck: it never changes", rotor + 1)};

@@ -60,6 +60,12 @@ Plan& plan_for(std::size_t window) {
 
 }  // namespace
 
+std::size_t welch_window(std::size_t frames) {
+  std::size_t window = kWindow;
+  while (window > kShortestWindow && window * 2 > frames) window /= 2;
+  return window * 2 > frames ? 0 : window;
+}
+
 WelchSpectrum::WelchSpectrum(std::size_t channels) : channels_(channels) {}
 
 void WelchSpectrum::choose_window(std::size_t window) {
@@ -91,9 +97,8 @@ void WelchSpectrum::transform_waiting(bool all) {
   const std::size_t frames = waiting_.size() / channels_;
   if (window_ == 0) {
     if (!all && frames < 2 * kWindow) return;  // how long the run is will decide
-    std::size_t window = kWindow;
-    while (window > kShortestWindow && window * 2 > frames) window /= 2;
-    if (window * 2 > frames) return;
+    const std::size_t window = welch_window(frames);
+    if (window == 0) return;
     choose_window(window);
   }
   std::size_t first = 0;
@@ -200,9 +205,9 @@ std::vector<double> grids_hz(const std::optional<double>& mains_hz) {
 
 std::vector<Origin> origins(double shaft_hz, double rate_hz, double bin_hz, const LineSources& sources) {
   constexpr int kLow = 8;
-  constexpr double kError_bins = 0.3, kGrid_Hz = 0.05;
+  constexpr double kGrid_Hz = 0.05;
   constexpr double kOvertone = 1, kAlias = 3, kHarmonic = 0.5;
-  const double error_hz = kError_bins * bin_hz;
+  const double error_hz = kLineError_bins * bin_hz;
   std::vector<Origin> result;
   for (int k = 1; shaft_hz > 0 && k <= 16; ++k) {
     const bool alias = k * shaft_hz > rate_hz / 2;
@@ -279,6 +284,15 @@ LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double r
     line.name =
         line.frequency_hz == list.shaft_hz ? "shaft" : name_of_line(line.frequency_hz, known, 1.5 * bin_hz);
   return list;
+}
+
+std::optional<double> middle_shaft_hz(const RunStatistics& statistics) {
+  std::vector<double> lines_hz;
+  for (const ChannelStatistics& channel : statistics.channels)
+    if (channel.shaft_hz) lines_hz.push_back(*channel.shaft_hz);
+  if (lines_hz.empty()) return {};
+  std::ranges::sort(lines_hz);
+  return (lines_hz[(lines_hz.size() - 1) / 2] + lines_hz[lines_hz.size() / 2]) / 2;
 }
 
 }  // namespace tunnelrig

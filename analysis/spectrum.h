@@ -49,6 +49,12 @@ class WelchSpectrum {
   std::vector<double> power_;
 };
 
+/// Frames of a window of a run of so many frames; 0 where they are too few for a spectrum.
+std::size_t welch_window(std::size_t frames);
+
+/// What a line's frequency is uncertain by (1 σ), in bins.
+inline constexpr double kLineError_bins = 0.3;
+
 /// Where a frequency appears after sampling.
 inline double folded(double frequency_hz, double rate_hz) {
   const double rest = std::fmod(frequency_hz, rate_hz);
@@ -80,5 +86,9 @@ struct LineList {
 };
 LineList find_lines(const WelchSpectrum& spectrum, std::size_t channel, double rate_hz,
                     const LineSources& sources);
+
+/// The run's shaft as seen by the middle one of the channels that show its line, of an even number the mean
+/// of the two: one that takes another line for it decides nothing.
+std::optional<double> middle_shaft_hz(const RunStatistics& statistics);
 
 }  // namespace tunnelrig

@@ -7,6 +7,7 @@
 #include "datasets/error.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -71,26 +72,27 @@ void finish_group(TableReduction& reduction, TableGroup& group) {
   group.at_highest = highest.c_t;
 }
 
-/// Many groups get thin lines of one colour and no legend; a handful get a legend.
+/// Many groups get thin lines of one colour and no legend; a handful get a legend, and markers and dashes of
+/// their own beside the colours. The axis is of the values: C_T varies by little of itself.
 std::string plot_script(const TableReduction& reduction, const std::string& terminal,
                         const std::string& output) {
   constexpr std::size_t kLegendGroups = 8;
+  constexpr std::array<int, kLegendGroups> kMarkers = {7, 5, 9, 13, 6, 4, 8, 12};
   const bool legend = reduction.groups.size() <= kLegendGroups;
-  const bool pulls = std::any_of(reduction.rows.begin(), reduction.rows.end(),
-                                 [](const TableRow& row) { return row.c_t < 0; });
   std::string script = fmt::format(
       "set terminal {}\nset output {}\nset encoding utf8\nset xlabel 'speed [rev/min]'\n"
-      "set ylabel 'C_T ({} convention)'\nset title {} noenhanced\nset grid lc rgb '#dddddd'\n{}\nset yrange "
-      "[{}:*]\nplot ",
+      "set ylabel 'C_T ({} convention)'\nset title {} noenhanced\nset grid lc rgb '#dddddd'\n{}\n"
+      "set offsets 0, 0, graph 0.05, graph 0.05\nplot ",
       terminal, gnuplot_text(output), name_of(reduction.convention), gnuplot_text(reduction.name),
-      legend ? "set key outside right noenhanced" : "unset key", pulls ? "*" : "0");
+      legend ? "set key outside right noenhanced" : "unset key");
   std::string data;
   for (std::size_t g = 0; g < reduction.groups.size(); ++g) {
     if (std::isnan(reduction.groups[g].lowest_speed_rpm)) continue;
-    script += fmt::format("{}'-' using 1:2 with linespoints pt 7 ps 0.4 lw {} {} title {}",
-                          data.empty() ? "" : ", ", legend ? "1.5" : "0.7",
-                          legend ? fmt::format("lt {}", g + 1) : "lc rgb '#800072b2'",
-                          gnuplot_text(reduction.groups[g].name));
+    script +=
+        fmt::format("{}'-' using 1:2 with linespoints {} title {}", data.empty() ? "" : ", ",
+                    legend ? fmt::format("lt {} dt {} pt {} ps 0.9 lw 1.5", g + 1, g % 5 + 1, kMarkers[g])
+                           : "pt 7 ps 0.4 lw 0.7 lc rgb '#800072b2'",
+                    gnuplot_text(reduction.groups[g].name));
     for (const std::size_t row : reduction.groups[g].rows)
       if (!std::isnan(reduction.rows[row].speed_rpm))
         data += fmt::format("{} {}\n", reduction.rows[row].speed_rpm, reduction.rows[row].c_t);

@@ -1,5 +1,6 @@
 #include "analysis/variance_components.h"
 
+#include "analysis/restricted_likelihood.h"
 #include "calibration/distributions.h"
 
 #include <algorithm>
@@ -16,24 +17,14 @@
 namespace tunnelrig {
 namespace {
 
-struct Visit {
-  std::size_t location = 0, session = 0;
-  double runs = 0, mean = 0, squares = 0;  // squares: around the visit's mean
-};
-
-struct Design {
-  std::vector<Visit> visits;
-  std::size_t locations = 0, sessions = 0;
-};
-
-Design design_of(const GroupedRuns& runs) {
+VisitDesign design_of(const GroupedRuns& runs) {
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> index;
-  Design design;
+  VisitDesign design;
   for (std::size_t i = 0; i < runs.value.size(); ++i) {
     const auto key = std::make_pair(runs.location[i], runs.session[i]);
     const auto [found, fresh] = index.emplace(key, design.visits.size());
     if (fresh) design.visits.push_back({key.first, key.second});
-    Visit& visit = design.visits[found->second];
+    LocationVisit& visit = design.visits[found->second];
     const double old_mean = visit.mean;  // Welford
     visit.runs += 1;
     visit.mean += (runs.value[i] - old_mean) / visit.runs;
@@ -119,10 +110,10 @@ double weight_of(const Prior& prior, double squares, double dof) {
   return prior.dof * std::min(1.0, 2 * p);
 }
 
-void fit_run_variances(const Design& design, VarianceComponents& components) {
+void fit_run_variances(const VisitDesign& design, VarianceComponents& components) {
   std::vector<double> squares(design.locations), dof(design.locations);
   double all_squares = 0, all_dof = 0;
-  for (const Visit& visit : design.visits) {
+  for (const LocationVisit& visit : design.visits) {
     squares[visit.location] += visit.squares;
     dof[visit.location] += visit.runs - 1;
     all_squares += visit.squares;
@@ -143,58 +134,15 @@ void fit_run_variances(const Design& design, VarianceComponents& components) {
   }
 }
 
-/// What a visit's mean varies by without the visit and session components.
-double own_variance(const Visit& visit, const VarianceComponents& components) {
-  return components.run_known ? components.run_by_location[visit.location] / visit.runs : 0;
-}
-
-/// Restricted log-likelihood of the visits' means, locations fixed, by Henderson's mixed-model equations:
-/// locations and visits are eliminated by hand, which leaves a matrix of sessions.
-double restricted_likelihood(const Design& design, const VarianceComponents& components, double visit,
-                             double session) {
-  const auto sessions = static_cast<Eigen::Index>(design.sessions);
-  std::vector<double> weight(design.locations), weighted(design.locations);
-  Eigen::MatrixXd by_location = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(design.locations), sessions);
-  Eigen::MatrixXd schur = Eigen::MatrixXd::Zero(sessions, sessions);
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(sessions);
-  double log_determinants = 0, squares = 0;
-  for (const Visit& v : design.visits) {
-    const double w = 1 / (visit + own_variance(v, components));
-    const auto s = static_cast<Eigen::Index>(v.session);
-    log_determinants -= std::log(w);
-    weight[v.location] += w;
-    weighted[v.location] += w * v.mean;
-    by_location(static_cast<Eigen::Index>(v.location), s) += w;
-    schur(s, s) += w;
-    right(s) += w * v.mean;
-    squares += w * v.mean * v.mean;
-  }
-  for (std::size_t l = 0; l < design.locations; ++l) {
-    if (weight[l] <= 0) continue;
-    const auto row = by_location.row(static_cast<Eigen::Index>(l));
-    log_determinants += std::log(weight[l]);
-    squares -= weighted[l] * weighted[l] / weight[l];
-    schur.noalias() -= row.transpose() * row / weight[l];
-    right -= row.transpose() * (weighted[l] / weight[l]);
-  }
-  if (session > 0) {
-    // log|G| + log|S + G⁻¹| = log|I + σ² S|, which stays finite as σ² goes to 0
-    const Eigen::MatrixXd scaled = Eigen::MatrixXd::Identity(sessions, sessions) + session * schur;
-    const Eigen::LLT<Eigen::MatrixXd> factor(scaled);
-    for (Eigen::Index s = 0; s < sessions; ++s) log_determinants += 2 * std::log(factor.matrixL()(s, s));
-    squares -= session * right.dot(factor.solve(right));
-  }
-  return -0.5 * (log_determinants + squares);
-}
-
 /// Maximises over both variances at once: a grid over decades, refined around its best point. The surface is
 /// smooth with at most a ridge, and a grid cannot fail to converge.
-void maximise(const Design& design, bool free_visit, bool free_session, double scale,
+void maximise(const VisitDesign& design, bool free_visit, bool free_session, double scale,
               VarianceComponents& components) {
   constexpr int kSteps = 4, kRounds = 9;
   double span = 3.0;  // decades on either side
   std::array<double, 2> centre = {std::log10(scale), std::log10(scale)};
   double best = -std::numeric_limits<double>::infinity();
+  const RestrictedLikelihood restricted_likelihood(design, components);
   for (int round = 0; round < kRounds; ++round, span *= 0.5) {
     const auto around = centre;
     for (int i = -kSteps - 1; i <= kSteps; ++i) {
@@ -203,7 +151,7 @@ void maximise(const Design& design, bool free_visit, bool free_session, double s
         const double at_visit = around[0] + span * i / kSteps, at_session = around[1] + span * j / kSteps;
         const double visit = i < -kSteps ? 0 : std::pow(10, at_visit);  // the extra step is the boundary
         const double session = j < -kSteps ? 0 : std::pow(10, at_session);
-        const double value = restricted_likelihood(design, components, visit, session);
+        const double value = restricted_likelihood(visit, session);
         if (!(value > best)) continue;
         best = value;
         components.visit = visit;
@@ -215,28 +163,41 @@ void maximise(const Design& design, bool free_visit, bool free_session, double s
   }
 }
 
-/// P₀ B for a matrix with a row per visit, P₀ being P below without sessions: what locations explain is taken
-/// off, location by location.
-Eigen::MatrixXd less_locations(const Design& design, const Eigen::VectorXd& weight,
-                               const Eigen::MatrixXd& b) {
-  const auto locations = static_cast<Eigen::Index>(design.locations);
-  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(locations, b.cols());
-  Eigen::VectorXd total = Eigen::VectorXd::Zero(locations);
-  for (Eigen::Index v = 0; v < b.rows(); ++v) {
-    const auto l = static_cast<Eigen::Index>(design.visits[static_cast<std::size_t>(v)].location);
-    mean.row(l) += weight(v) * b.row(v);
-    total(l) += weight(v);
+/// Zᵀ P₀ᵏ Z, P₀ being P below without sessions and Z the sessions of the visits. Of one location P₀ is
+/// W − w wᵀ/Σw, and it saw a session at most once: the powers are a diagonal and few products of columns.
+struct PowersOfSessions {
+  Eigen::MatrixXd once, twice, thrice;
+
+  PowersOfSessions(const VisitDesign& design, const Eigen::VectorXd& weight) {
+    const auto sessions = static_cast<Eigen::Index>(design.sessions),
+               locations = static_cast<Eigen::Index>(design.locations);
+    Eigen::MatrixXd w = Eigen::MatrixXd::Zero(sessions, locations);
+    for (Eigen::Index v = 0; v < weight.size(); ++v) {
+      const LocationVisit& visit = design.visits[static_cast<std::size_t>(v)];
+      w(static_cast<Eigen::Index>(visit.session), static_cast<Eigen::Index>(visit.location)) = weight(v);
+    }
+    const Eigen::MatrixXd w2 = w.array().square(), w3 = w.array().cube();
+    const auto never_visited = [](double sum) { return sum > 0 ? 1 / sum : 0; };
+    const Eigen::VectorXd share = w.colwise().sum().transpose().unaryExpr(never_visited);  // 1/Σw
+    const Eigen::VectorXd second =
+        w2.colwise().sum().transpose().cwiseProduct(share).cwiseProduct(share);  // Σw²/(Σw)²
+    const Eigen::VectorXd third = w3.colwise().sum().transpose().cwiseProduct(share).cwiseProduct(share) -
+                                  second.cwiseProduct(second).cwiseQuotient(share.cwiseMax(1e-300));
+    const Eigen::MatrixXd one_by = w * share.asDiagonal(), two_by = w2 * share.asDiagonal(),
+                          one_second = w * second.asDiagonal();
+    once = -one_by * w.transpose();
+    once.diagonal() += w.rowwise().sum();
+    const Eigen::MatrixXd cross = w2 * one_by.transpose();
+    twice = one_second * w.transpose() - cross - cross.transpose();
+    twice.diagonal() += w2.rowwise().sum();
+    const Eigen::MatrixXd uneven = w3 * one_by.transpose() - w2 * one_second.transpose();
+    thrice = w * third.asDiagonal() * w.transpose() - two_by * w2.transpose() - uneven - uneven.transpose();
+    thrice.diagonal() += w3.rowwise().sum();
   }
-  Eigen::MatrixXd result(b.rows(), b.cols());
-  for (Eigen::Index v = 0; v < b.rows(); ++v) {
-    const auto l = static_cast<Eigen::Index>(design.visits[static_cast<std::size_t>(v)].location);
-    result.row(v) = weight(v) * (b.row(v) - mean.row(l) / total(l));
-  }
-  return result;
-}
+};
 
 /// tr P₀²
-double squares_less_locations(const Design& design, const Eigen::VectorXd& weight) {
+double squares_less_locations(const VisitDesign& design, const Eigen::VectorXd& weight) {
   std::vector<double> sum(design.locations), squares(design.locations), cubes(design.locations);
   for (std::size_t v = 0; v < design.visits.size(); ++v) {
     const double w = weight(static_cast<Eigen::Index>(v));
@@ -252,22 +213,16 @@ double squares_less_locations(const Design& design, const Eigen::VectorXd& weigh
   return trace;
 }
 
-/// Covariance of the two estimates: the inverse of the expected information, ½ tr(P V_k P V_l). With Z the
-/// sessions of the visits and G = (I + σ² Zᵀ P₀ Z)⁻¹ is P = P₀ − σ² P₀ Z G Zᵀ P₀, so that nothing is larger
-/// than visits times sessions.
-Eigen::Matrix2d covariance_of_estimates(const Design& design, const VarianceComponents& components) {
+/// Covariance of the two estimates: the inverse of the expected information, ½ tr(P V_k P V_l). With
+/// G = (I + σ² Zᵀ P₀ Z)⁻¹ is P = P₀ − σ² P₀ Z G Zᵀ P₀, so that nothing is larger than sessions times
+/// sessions.
+Eigen::Matrix2d covariance_of_estimates(const VisitDesign& design, const VarianceComponents& components) {
   const auto n = static_cast<Eigen::Index>(design.visits.size());
   const auto sessions = static_cast<Eigen::Index>(design.sessions);
   Eigen::VectorXd weight(n);
-  Eigen::MatrixXd z = Eigen::MatrixXd::Zero(n, sessions);
-  for (Eigen::Index v = 0; v < n; ++v) {
-    const Visit& visit = design.visits[static_cast<std::size_t>(v)];
-    weight(v) = 1 / (components.visit + own_variance(visit, components));
-    z(v, static_cast<Eigen::Index>(visit.session)) = 1;
-  }
-  const Eigen::MatrixXd p_z = less_locations(design, weight, z);  // P₀ Z
-  const Eigen::MatrixXd once = z.transpose() * p_z, twice = p_z.transpose() * p_z,
-                        thrice = p_z.transpose() * less_locations(design, weight, p_z);  // Zᵀ P₀ᵏ Z
+  for (Eigen::Index v = 0; v < n; ++v)
+    weight(v) = 1 / (components.visit + own_variance(design.visits[static_cast<std::size_t>(v)], components));
+  const auto [once, twice, thrice] = PowersOfSessions(design, weight);
   const double session = components.session;
   const Eigen::MatrixXd g = (Eigen::MatrixXd::Identity(sessions, sessions) + session * once)
                                 .llt()
@@ -276,7 +231,7 @@ Eigen::Matrix2d covariance_of_estimates(const Design& design, const VarianceComp
   const double visit_visit =
       0.5 * (squares_less_locations(design, weight) - 2 * session * g.cwiseProduct(thrice).sum() +
              session * session * g_twice.cwiseProduct(g_twice.transpose()).sum());
-  const double visit_session = 0.5 * (p_z * g).squaredNorm();
+  const double visit_session = 0.5 * g.cwiseProduct(g_twice.transpose()).sum();
   const double session_session = 0.5 * g_once.cwiseProduct(g_once.transpose()).sum();
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
   if (components.visit_known && components.session_known) {
@@ -295,7 +250,7 @@ Eigen::Matrix2d covariance_of_estimates(const Design& design, const VarianceComp
 
 VarianceComponents fit_variance_components(const GroupedRuns& runs) {
   VarianceComponents components;
-  const Design design = design_of(runs);
+  const VisitDesign design = design_of(runs);
   fit_run_variances(design, components);
   const std::size_t visits = design.visits.size();
   const std::size_t freedom =
@@ -312,11 +267,11 @@ VarianceComponents fit_variance_components(const GroupedRuns& runs) {
 
   double squares = 0;
   std::vector<double> count(design.locations), mean(design.locations);
-  for (const Visit& visit : design.visits) {
+  for (const LocationVisit& visit : design.visits) {
     count[visit.location] += 1;
     mean[visit.location] += (visit.mean - mean[visit.location]) / count[visit.location];
   }
-  for (const Visit& visit : design.visits)
+  for (const LocationVisit& visit : design.visits)
     squares += (visit.mean - mean[visit.location]) * (visit.mean - mean[visit.location]);
   const double scale = std::max(squares / static_cast<double>(std::max<std::size_t>(freedom, 1)), 1e-300);
   maximise(design, components.visit_known, components.session_known, scale, components);
@@ -325,7 +280,7 @@ VarianceComponents fit_variance_components(const GroupedRuns& runs) {
 }
 
 LocationMeans location_means(const GroupedRuns& runs, const VarianceComponents& components) {
-  const Design design = design_of(runs);
+  const VisitDesign design = design_of(runs);
   const std::size_t n = design.locations;
   LocationMeans means{.mean = std::vector<double>(n),
                       .std = std::vector<double>(n),
@@ -337,7 +292,7 @@ LocationMeans location_means(const GroupedRuns& runs, const VarianceComponents& 
                       .visit_part = std::vector<double>(n),
                       .session_part = std::vector<double>(n)};
   std::vector<double> total(n), squares(n);
-  for (const Visit& visit : design.visits) {
+  for (const LocationVisit& visit : design.visits) {
     total[visit.location] += visit.runs;
     means.mean[visit.location] += visit.runs * visit.mean;
     means.sessions[visit.location] += 1;
@@ -350,7 +305,7 @@ LocationMeans location_means(const GroupedRuns& runs, const VarianceComponents& 
   // Shares of a location's runs in each session: w(l, s)
   Eigen::MatrixXd share =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(design.sessions));
-  for (const Visit& visit : design.visits) {
+  for (const LocationVisit& visit : design.visits) {
     share(static_cast<Eigen::Index>(visit.location), static_cast<Eigen::Index>(visit.session)) =
         visit.runs / total[visit.location];
   }

@@ -10,6 +10,7 @@
 
 namespace tunnelrig::cli {
 
+/// kBadInput also where there is no room to write.
 enum ExitCode { kWell = 0, kProblemFound = 1, kBadInput = 2 };
 
 /// The version that provenance names.

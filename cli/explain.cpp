@@ -9,6 +9,7 @@
 #include "cli/verb.h"
 #include "datasets/error.h"
 #include "datasets/observations.h"
+#include "datasets/output_place.h"
 
 #include <cmath>
 #include <memory>
@@ -101,6 +102,13 @@ void adopt_and_store(const ExplainOptions& options, const Observations& observat
                    adoption.model->name()));
 }
 
+/// Before a search that may take minutes.
+void check_outputs(const ExplainOptions& options) {
+  check_distinct({{"--json", options.json}, {"--html", options.html}});
+  if (!options.json.empty() && options.json != "-") check_can_be_written(options.json);
+  if (!options.html.empty()) check_can_be_written(options.html);
+}
+
 /// What would be left out in silence.
 void refuse_unused(const ExplainOptions& options, const CLI::App& verb) {
   if (options.html == "-") throw InputError("--html -: the page goes to a file; - is of --json");
@@ -115,6 +123,7 @@ void refuse_unused(const ExplainOptions& options, const CLI::App& verb) {
 
 int run_explain(ExplainOptions options, const CLI::App& verb) {
   refuse_unused(options, verb);
+  check_outputs(options);
   if (options.list) return list(options);
   if (options.db.empty()) throw InputError("--db is required (all but --list need a campaign)");
   if ((options.adopt || options.adopt_empirical) && !options.effects.empty())

@@ -5,6 +5,8 @@
 #include "datasets/error.h"
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -21,8 +23,15 @@ int export_folder(const CampaignFile& file, const ExportOptions& options) {
         "--parts, --model and --with are for --format hdf5, mat, csv and npy; a campaign folder holds what "
         "was measured, all of it");
   ProgressBar bar("export");
-  export_campaign_folder(file, options.target, show_on(bar));
-  fmt::print("{}: {} runs\n", options.target, file.runs().size());
+  const std::vector<std::string> unfinished = export_campaign_folder(file, options.target, show_on(bar));
+  for (const std::string& run : unfinished)
+    warn(fmt::format(
+        "run {} is being recorded, or its recorder was killed: the folder has it as far as it got, "
+        "excluded as partial",
+        run));
+  fmt::print(
+      "{}: {} runs{}\n", options.target, file.runs().size(),
+      unfinished.empty() ? "" : fmt::format(", {} of them not recorded to the end", unfinished.size()));
   return kWell;
 }
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -17,13 +18,18 @@ constexpr std::size_t kMost = kCategoryColours.size();
 
 std::string style(std::size_t i) { return fmt::format("lc rgb '{}' lw 1.8", kCategoryColours[i % kMost]); }
 
-/// Inline data blocks: walls, reference, and one path per controller.
+/// Inline data blocks: walls, vehicle, reference, and one path per controller.
 std::string data_blocks(const FlownScenario& flown, const FlightTask& task, std::size_t shown) {
   std::string text = "$walls << EOD\n";
   for (const auto& edge : task.space->walls.edges())
     text += fmt::format("{:.4f} {:.4f}\n", edge.from[0], edge.from[1]);
   const auto& first = task.space->walls.edges()[0].from;
-  text += fmt::format("{:.4f} {:.4f}\nEOD\n$reference << EOD\n", first[0], first[1]);
+  text += fmt::format("{:.4f} {:.4f}\nEOD\n$vehicle << EOD\n", first[0], first[1]);
+  const Plane start = {flown.logs[0].rows[0].position_m[0], flown.logs[0].rows[0].position_m[1]};
+  for (const auto& [right, up] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}, {-1, -1}})
+    text += fmt::format("{:.4f} {:.4f}\n", start[0] + 0.5 * right * task.believed.width_m,
+                        start[1] + 0.5 * up * task.believed.height_m);
+  text += "EOD\n$reference << EOD\n";
   for (const LogRow& row : flown.logs[0].rows)
     text += fmt::format("{:.4f} {:.4f}\n", row.reference_m[0], row.reference_m[1]);
   text += "EOD\n";
@@ -41,14 +47,13 @@ std::string data_blocks(const FlownScenario& flown, const FlightTask& task, std:
   return text;
 }
 
-std::string path_plot(const FlownScenario& flown, const FlightTask& task, std::size_t shown) {
+std::string path_plot(const FlownScenario& flown, std::size_t shown) {
   std::string text =
       "set size ratio -1\nset xlabel 'y [m]'\nset ylabel 'z above the floor [m]'\n"
       "set key outside right top\nset offsets graph 0.03, graph 0.03, graph 0.03, graph 0.03\n"
       "plot $walls with lines lc rgb '#333333' lw 2.5 dt 3 title 'tunnel', "
+      "$vehicle with lines lc rgb '#999999' lw 1 title 'vehicle at the start', "
       "$reference with lines lc rgb '#000000' lw 1.2 title 'reference'";
-  const Plane start = {flown.logs[0].rows[0].position_m[0], flown.logs[0].rows[0].position_m[1]};
-  std::string outline;
   for (std::size_t i = 0; i < shown; ++i) {
     text += fmt::format(", $path{} using 2:3 with lines {} title '{}'", i, style(i),
                         flown.controllers[i].controller);
@@ -56,11 +61,7 @@ std::string path_plot(const FlownScenario& flown, const FlightTask& task, std::s
       text += fmt::format(", $touch{} with points pt 2 ps 1.8 {} title '{}: contact'", i, style(i),
                           flown.controllers[i].controller);
   }
-  const double w = 0.5 * task.believed.width_m, h = 0.5 * task.believed.height_m;
-  return fmt::format(
-             "set object 1 rectangle from {:.4f},{:.4f} to {:.4f},{:.4f} fs empty border rgb '#999999'\n",
-             start[0] - w, start[1] - h, start[0] + w, start[1] + h) +
-         text + "\nunset object 1\n";
+  return text + "\n";
 }
 
 std::string error_plot(const FlownScenario& flown, std::size_t shown, const char* axis, int column) {
@@ -101,7 +102,7 @@ std::vector<std::filesystem::path> draw_flown(const std::filesystem::path& folde
     }
   };
   script = "set encoding utf8\nset grid lc rgb '#dddddd'\n" + script;
-  add(kPictures[0], path_plot(flown, task, shown), 1000, 820);
+  add(kPictures[0], path_plot(flown, shown), 1000, 820);
   add(kPictures[1], error_plot(flown, shown, "y", 4), 1100, 520);
   add(kPictures[2], error_plot(flown, shown, "z", 5), 1100, 520);
   const Staging staging(folder, "pictures");

@@ -3,8 +3,10 @@
 #include "cli/verb.h"
 #include "datasets/campaign_file.h"
 #include "datasets/error.h"
+#include "datasets/raw_store.h"
 
 #include <csignal>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -79,6 +81,22 @@ int run_one(const LogOptions& options) {
   return logging.record(asked, "");
 }
 
+/// Of a recording that a full disk has ended.
+std::string what_is_kept(const std::string& db) {
+  std::error_code error;
+  if (!std::filesystem::exists(db, error))
+    return fmt::format("Nothing was recorded, and there is no {}.", db);
+  try {
+    const CampaignFile file(db, CampaignFile::Access::kRead);
+    for (const RawRun& run : raw_runs(file))
+      if (run.state == RunState::kRecording && run.frames > 0)
+        return "The run ends here as partial; everything before it is safe.";
+    return "Nothing of this run was recorded; everything before it is safe.";
+  } catch (const std::runtime_error&) {  // even to read takes some room
+    return "What was recorded until then is safe.";
+  }
+}
+
 int run_log(const LogOptions& options, const CLI::App& verb) {
   if (options.source != "virtual")
     refuse_given(verb, {"--speed", "--seed", "--faults"}, "is for the virtual rig, not for another --source");
@@ -95,9 +113,8 @@ int run_log(const LogOptions& options, const CLI::App& verb) {
     return options.plan.empty() ? run_one(options) : run_plan(options);
   } catch (const StorageError& error) {
     if (!error.disk_full()) throw;
-    throw StorageError(fmt::format("the disk is full ({}). The run ends here as partial; everything before "
-                                   "it is safe. Make room and log again.",
-                                   error.what()),
+    throw StorageError(fmt::format("the disk is full ({}). {} Make room and log again.", error.what(),
+                                   what_is_kept(options.db)),
                        true);
   }
 }

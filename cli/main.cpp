@@ -98,7 +98,9 @@ int main(int argc, char** argv) {
   } catch (const InputError& error) {
     return cli::report(error.what(), cli::kBadInput);
   } catch (const StorageError& error) {
-    return cli::report(error.what(), cli::kProblemFound);
+    // For want of room nothing was found: what was asked for could not be done, as where other files cannot
+    // be written.
+    return cli::report(error.what(), error.disk_full() ? cli::kBadInput : cli::kProblemFound);
   } catch (const std::exception& error) {
     if (std::ferror(stdout) != 0) return cli::cannot_print();
     return cli::report(fmt::format("this should not have happened: {}", error.what()), cli::kProblemFound);

@@ -1,3 +1,4 @@
+#include "analysis/implausible_thrust.h"
 #include "analysis/maps/write_maps.h"
 #include "analysis/model/model_store.h"
 #include "analysis/reduction_output.h"
@@ -132,6 +133,10 @@ int run_map(const MapOptions& options) {
     problem = problem || run.problem;
     if (run.problem || run.reason.starts_with("excluded"))
       warn(fmt::format("run {} is left out: {}", run.run, run.reason));
+  }
+  if (const auto doubt = implausible_thrust(data, reduction); doubt && doubt->certain) {
+    warn(fmt::format("{}: {}", doubt->found, doubt->advice));
+    problem = true;
   }
   if (!maps.input.scatter_known)
     warn(fmt::format(

@@ -94,7 +94,7 @@ void print_summary(const CampaignData& data, const Reduction& reduction, const S
 /// True where it is a mistake for certain.
 bool warn_of(const std::optional<ImplausibleThrust>& doubt) {
   if (doubt) warn(fmt::format("{}: {}", doubt->found, doubt->advice));
-  return doubt && doubt->too_much;
+  return doubt && doubt->certain;
 }
 
 /// Tares whose zeros clipped samples bias.

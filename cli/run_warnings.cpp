@@ -74,12 +74,13 @@ bool warn_of_flags(const std::string& run, const Ledger& ledger) {
 }
 
 bool warn_of_channels(const std::string& run, const RunStatistics& statistics, int rotors) {
-  bool problem = false;
+  bool problem = statistics.frames == 1;
+  if (problem) warn(fmt::format("run {}: it has one frame only, too short for a mean", run));
   for (std::size_t c = 0; c < statistics.channels.size() && c < static_cast<std::size_t>(rotors); ++c) {
     const ChannelStatistics& channel = statistics.channels[c];
     if (channel.clipped > 0)
       warn(fmt::format("run {}: channel {} clipped in {} samples", run, c + 1, channel.clipped));
-    if (channel.stuck())
+    if (channel.stuck() && statistics.frames > 1)
       warn(fmt::format("run {}: channel {} is stuck at {:.4f} V", run, c + 1, channel.lowest_V));
     problem |= channel.stuck() || channel.clipped > 0;
   }

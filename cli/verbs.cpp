@@ -11,7 +11,8 @@ namespace tunnelrig::cli {
 const char* const kProgramDescription =
     "tunnelrig: from the packets of a static-thrust rig to maps of the disturbance a quadcopter meets in a "
     "tunnel.";
-const char* const kExitCodes = "Exit codes: 0 all is well, 1 a problem was found, 2 bad input.";
+const char* const kExitCodes =
+    "Exit codes: 0 all is well, 1 a problem was found, 2 bad input, or a disk without room.";
 
 void declare_program(CLI::App& app, Work& work) {
   app.name("tunnelrig");

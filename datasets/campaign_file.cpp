@@ -149,6 +149,19 @@ void migrate(Database& database, std::string_view schema) {
 }
 
 CampaignFile::CampaignFile(const std::filesystem::path& path, Access access) : path_(path) {
+  try {
+    open(access);
+  } catch (...) {
+    database_.reset();
+    std::error_code error;  // a file that was made and cannot be filled goes, while it is still locked
+    if (made_)
+      for (const auto& each : files_of_campaign(path)) std::filesystem::remove(each, error);
+    throw;
+  }
+}
+
+void CampaignFile::open(Access access) {
+  const std::filesystem::path& path = path_;
   std::error_code error;
   if (std::filesystem::is_directory(path, error))
     throw InputError::in(path.string(), "is a folder, where a campaign file is asked for");

@@ -109,6 +109,7 @@ class CampaignFile {
   friend class StagedCampaign;
   struct Unsafe {};
   CampaignFile(const std::filesystem::path& path, Unsafe);  // no journal: for a file nobody else sees yet
+  void open(Access access);
 
   std::filesystem::path path_;
   std::shared_ptr<void> lock_;  // held by a recorder

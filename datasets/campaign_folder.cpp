@@ -170,9 +170,9 @@ void check_statistics(const RunStatistics& statistics, const CampaignInfo& info,
     if (channel.stuck() && run.kind == RunKind::kThrust && !allow_stuck) {
       throw InputError::at(
           "runs.csv", run.line,
-          "run {}: channel {} of {} is stuck at {:g} V for the whole run; take the run out of runs.csv, "
+          "run {}: channel {} of {} is stuck at {:g} V for the {}; take the run out of runs.csv, "
           "or import with --allow-stuck to keep it marked",
-          run.run, c + 1, run.raw, channel.lowest_V);
+          run.run, c + 1, run.raw, channel.lowest_V, statistics.frames == 1 ? "one frame" : "whole run");
     }
   }
 }
@@ -386,11 +386,13 @@ ImportSummary import_campaign_folder(const fs::path& folder, const fs::path& fil
   return summary;
 }
 
-void export_campaign_folder(const CampaignFile& file, const fs::path& folder, const Progress& progress) {
+std::vector<std::string> export_campaign_folder(const CampaignFile& file, const fs::path& folder,
+                                                const Progress& progress) {
   const Snapshot snapshot(file);
   StagedOutput staged(folder, StagedOutput::Kind::kFolder);
   staged.write([&] { write_folder(file, staged.path(), progress); });
   staged.publish();
+  return unfinished_runs(file);
 }
 
 }  // namespace tunnelrig

@@ -37,8 +37,10 @@ ImportSummary import_campaign_folder(const std::filesystem::path& folder, const 
 
 /// Writes the campaign as a folder that must not exist, or be empty. Import of it gives the same campaign:
 /// text cell by cell, array types, values and gaps. The folder appears whole or not at all.
-/// Throws InputError naming what cannot be written, StorageError where raw data are damaged.
-void export_campaign_folder(const CampaignFile& file, const std::filesystem::path& folder,
-                            const Progress& progress);
+/// Runs whose recording has not ended are in it as far as they got, excluded like every partial one; their
+/// names are returned. Throws InputError naming what cannot be written, StorageError where raw data are
+/// damaged.
+std::vector<std::string> export_campaign_folder(const CampaignFile& file, const std::filesystem::path& folder,
+                                                const Progress& progress);
 
 }  // namespace tunnelrig

@@ -115,12 +115,13 @@ void check_encoding(std::string_view text, const std::string& file) {
   }
 }
 
-void check_header(const Sheet& sheet) {
+void check_header(const Sheet& sheet, bool only_line) {
   for (std::size_t i = 0; i < sheet.columns.size(); ++i) {
     if (std::find(sheet.columns.begin(), sheet.columns.begin() + static_cast<std::ptrdiff_t>(i),
                   sheet.columns[i]) != sheet.columns.begin() + static_cast<std::ptrdiff_t>(i) &&
         !sheet.columns[i].empty()) {
-      throw InputError::at(sheet.file, 1, "column {} stands twice in the header", sheet.columns[i]);
+      throw InputError::at(sheet.file, 1, "column {} stands twice in the header{}", sheet.columns[i],
+                           only_line ? "; the file is this one line: has it lost its line ends?" : "");
     }
   }
 }
@@ -247,7 +248,7 @@ Sheet parse_csv(std::string_view text, const std::string& file, std::string_view
   if (scanner.at_end()) throw InputError::at(file, 1, "the file is empty; a header row is required");
   sheet.columns = scanner.record();
   for (std::string& column : sheet.columns) column = trimmed(column);
-  check_header(sheet);
+  check_header(sheet, scanner.at_end());
   while (!scanner.at_end()) {
     const int line = scanner.line();
     std::vector<std::string> cells = scanner.record();

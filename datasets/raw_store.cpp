@@ -284,6 +284,13 @@ StoredHash hash_of_raw(const CampaignFile& file, const RawRun& run) {
   return {sink.hasher.finish(sink.gaps), damaged};
 }
 
+std::vector<std::string> unfinished_runs(const CampaignFile& file) {
+  std::vector<std::string> names;
+  for (const RawRun& run : raw_runs(file))
+    if (run.state == RunState::kRecording) names.push_back(run.run);
+  return names;
+}
+
 std::vector<std::string> close_interrupted_runs(CampaignFile& file) {
   std::vector<std::string> names;
   for (const RawRun& run : raw_runs(file)) {

@@ -116,6 +116,9 @@ struct StoredHash {
 };
 StoredHash hash_of_raw(const CampaignFile& file, const RawRun& run);
 
+/// Runs in state "recording": one is under way, or its recorder was killed.
+std::vector<std::string> unfinished_runs(const CampaignFile& file);
+
 /// Runs left in state "recording" belong to a recorder that was killed: marks them partial, with their hash
 /// and, in the ledger, the reason. The file must be open for recording, so that nobody can still be writing
 /// them. Returns their names.

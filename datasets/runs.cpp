@@ -259,7 +259,22 @@ std::vector<Run> parse_runs(const Sheet& sheet, const CampaignInfo& campaign) {
   return runs;
 }
 
+namespace {
+
+/// A required column that stands there in another unit.
+void require_in_our_unit(const Sheet& sheet, std::string_view ours) {
+  const std::string_view quantity = ours.substr(0, ours.rfind('_'));
+  for (const std::string& column : sheet.columns)
+    if (!sheet.find(ours) && column.starts_with(quantity))
+      throw InputError::at(sheet.file, 1,
+                           "column {}: this quantity is read as {}; convert it and rename the column", column,
+                           ours);
+}
+
+}  // namespace
+
 std::vector<CalibrationPoint> parse_calibration(const Sheet& sheet, int rotors) {
+  for (const char* ours : {"applied_force_N", "voltage_V"}) require_in_our_unit(sheet, ours);
   std::vector<CalibrationPoint> points;
   for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
     CalibrationPoint point;
@@ -283,6 +298,7 @@ std::vector<CalibrationPoint> parse_calibration(const Sheet& sheet, int rotors) 
 }
 
 std::vector<PropellerTest> parse_propellers(const Sheet& sheet, int rotors) {
+  require_in_our_unit(sheet, "thrust_N");
   std::vector<PropellerTest> tests;
   for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
     PropellerTest test;

@@ -4,25 +4,71 @@
 
 #include <cerrno>
 #include <cstdlib>
+#include <string_view>
 #include <system_error>
 
-namespace tunnelrig {
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
-Staging::Staging(const std::filesystem::path& target, const std::string& what)
-    : target_(target), folders_(target) {
+namespace tunnelrig {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kScratch = ".scratch-", kAnyName = "XXXXXX";
+
+int open_folder(const fs::path& folder) {
+  return ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+}
+
+bool still_there(int fd, const fs::path& folder) {
+  struct stat held {
+  }, named{};
+  return ::fstat(fd, &held) == 0 && ::stat(folder.c_str(), &named) == 0 && held.st_ino == named.st_ino &&
+         held.st_dev == named.st_dev;
+}
+
+/// Scratch folders of programs that were killed: the kernel has dropped their locks.
+void remove_abandoned(const fs::path& target) {
   std::error_code error;
-  std::filesystem::create_directories(target, error);
-  std::string name = (target / ".scratch-XXXXXX").string();
-  if (error || ::mkdtemp(name.data()) == nullptr) {
-    throw InputError::in(target.string(), "{} cannot be written here: {}", what,
-                         error ? error.message() : std::generic_category().message(errno));
+  for (const auto& entry : fs::directory_iterator(target, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(kScratch) || name.size() != kScratch.size() + kAnyName.size()) continue;
+    const int fd = open_folder(entry.path());
+    if (fd < 0) continue;
+    if (::flock(fd, LOCK_EX | LOCK_NB) == 0) fs::remove_all(entry.path(), error);
+    ::close(fd);
   }
-  path_ = name;
+}
+
+}  // namespace
+
+Staging::Staging(const fs::path& target, const std::string& what) : target_(target), folders_(target) {
+  std::error_code error;
+  fs::create_directories(target, error);
+  if (!error) remove_abandoned(target);
+  while (true) {
+    std::string name = (target / kScratch).string() + std::string(kAnyName);
+    if (error || ::mkdtemp(name.data()) == nullptr) {
+      throw InputError::in(target.string(), "{} cannot be written here: {}", what,
+                           error ? error.message() : std::generic_category().message(errno));
+    }
+    path_ = name;
+    lock_ = open_folder(path_);
+    if (lock_ < 0) return;
+    ::flock(lock_, LOCK_EX);
+    // Between its making and its lock another program may have taken it for abandoned.
+    if (still_there(lock_, path_)) return;
+    ::close(lock_);
+  }
 }
 
 Staging::~Staging() {
   std::error_code error;
-  std::filesystem::remove_all(path_, error);
+  fs::remove_all(path_, error);
+  if (lock_ >= 0) ::close(lock_);
 }
 
 std::vector<std::filesystem::path> Staging::publish(const std::vector<std::string>& names) const {

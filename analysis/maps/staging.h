@@ -11,7 +11,8 @@
 namespace tunnelrig {
 
 /// A scratch folder within the target, so that renaming out of it stays on one file system; gone afterwards,
-/// and the target with it where it was made for this and nothing was published.
+/// and the target with it where it was made for this and nothing was published. What a program leaves that is
+/// killed meanwhile goes with the next one into the same target.
 class Staging {
  public:
   /// Makes the target where it is missing. Throws InputError naming it where that cannot be, with `what` is
@@ -33,6 +34,7 @@ class Staging {
 
  private:
   std::filesystem::path target_, path_;
+  int lock_ = -1;  // on the scratch folder, as long as this program lives
   FoldersForOutput folders_;
 };
 

@@ -1,5 +1,6 @@
 // What is known of every run: coefficients, health, zeros.
 #include "analysis/report/sections.h"
+#include "analysis/spectrum.h"
 #include "datasets/locations.h"
 
 #include <algorithm>
@@ -24,15 +25,9 @@ std::uint64_t clipped_samples(const RunStatistics& statistics) {
   return clipped;
 }
 
-/// Median over the channels that show a shaft line.
 Json shaft_rpm(const RunStatistics& statistics) {
-  std::vector<double> lines_hz;
-  for (const ChannelStatistics& channel : statistics.channels) {
-    if (channel.shaft_hz) lines_hz.push_back(*channel.shaft_hz);
-  }
-  if (lines_hz.empty()) return nullptr;
-  std::sort(lines_hz.begin(), lines_hz.end());
-  return rounded(60 * (lines_hz[(lines_hz.size() - 1) / 2] + lines_hz[lines_hz.size() / 2]) / 2, 2);
+  const auto shaft_hz = middle_shaft_hz(statistics);
+  return shaft_hz ? rounded(60 * *shaft_hz, 2) : Json(nullptr);
 }
 
 void add_statistics(const Material& material, const Run& run, Json& columns) {

@@ -86,6 +86,44 @@ TEST_F(Health, MissingTemperatureAndOffSpeed) {
   EXPECT_THAT(found(Severity::kNote), HasSubstr("R2 (4900)"));
 }
 
+/// What is said of R1, of so many frames at 1333 Hz and 5000 rev/min, where its channels show these lines.
+std::string speeds_said(const CampaignFile& file, std::uint64_t frames, const std::vector<double>& lines_hz) {
+  CampaignData data = read_campaign_data(file);
+  RunStatistics& statistics = data.statistics.at("R1");
+  statistics.frames = frames;
+  for (std::size_t c = 0; c < lines_hz.size(); ++c) statistics.channels.at(c).shaft_hz = lines_hz[c];
+  std::string text;
+  for (const Finding& finding : examine(file, data, {}))
+    if (finding.check == "speed" && finding.severity == Severity::kProblem) text += finding.found;
+  return text;
+}
+
+TEST_F(Health, TheShaftsLineIsKnownToItsBinsAndByTheMiddleChannel) {
+  import();
+  const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+  const double hz = 5000 / 60.0;
+  EXPECT_EQ(speeds_said(file, 100000, {hz, hz, hz, hz + 1}), "") << "one channel took another line for it";
+  EXPECT_THAT(speeds_said(file, 100000, {hz, hz + 1, hz + 1, hz + 1}), HasSubstr("R1 (5060 against 5000)"));
+  EXPECT_EQ(speeds_said(file, 800, {hz + 1, hz + 1, hz + 1, hz + 1}), "") << "a fifth of a bin of 5.2 Hz";
+  EXPECT_THAT(speeds_said(file, 1600, {hz + 3, hz + 3, hz + 3, hz + 3}), HasSubstr("against 5000"));
+}
+
+TEST_F(Health, OneFrameIsTooShortAndNotStuck) {
+  import();
+  EXPECT_THAT(found(Severity::kNote), HasSubstr("their zero is the calibration's, extrapolated\n"))
+      << "there is no calibration yet, and no force that it begins at";
+  calibrate_file();
+  const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+  CampaignData data = read_campaign_data(file);
+  RunStatistics& statistics = data.statistics.at("R2");
+  statistics.frames = 1;
+  for (ChannelStatistics& channel : statistics.channels) channel.lowest_V = channel.highest_V;
+  std::string text;
+  for (const Finding& finding : examine(file, data, {})) text += finding.found + "\n";
+  EXPECT_THAT(text, HasSubstr("one frame only, too short for a mean: R2\n"));
+  EXPECT_THAT(text, testing::Not(HasSubstr("stuck, never change")));
+}
+
 TEST_F(Health, DamagedAndChangedRawData) {
   import();
   calibrate_file();

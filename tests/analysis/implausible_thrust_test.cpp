@@ -72,6 +72,27 @@ TEST(ImplausibleThrust, KilogramsADiameterAndAWrongSpeed) {
   EXPECT_THAT(found(thrusts_N({sound, sound, sound}, 0.1524, 500)), HasSubstr("so at 2 of 2 locations"));
 }
 
+TEST(ImplausibleThrust, ACellOfTheWrongSign) {
+  const std::string mirrored = "-7.1,7.4,7.6,7.2";
+  const CampaignData most = thrusts_N({mirrored, mirrored, "7.1,7.4,7.6,7.2"});
+  EXPECT_THAT(found(most),
+              AllOf(HasSubstr("rotor 1 gives -7.1 N where another gives 7.6 N, so in 2 of 3 runs: "),
+                    HasSubstr("wrong sign")));
+  EXPECT_TRUE(implausible_thrust(most)->certain);
+  const std::string two = "-7.1,7.4,-7.2,7.3";
+  EXPECT_THAT(found(thrusts_N({two, two, two})),
+              HasSubstr("; rotor 3 gives -7.2 N where another gives 7.4 N, so in 3 of 3 runs"));
+}
+
+TEST(ImplausibleThrust, SignsThatAreNoMistake) {
+  const std::string back = "-7.1,-7.4,-7.6,-7.2", noise = "0.02,-0.01,0.01,-0.01",
+                    stands = "-0.3,7.4,7.6,7.2";
+  for (const std::string& cells : {back, noise, stands}) {
+    const std::string said = found(thrusts_N({cells, cells, cells}));
+    EXPECT_EQ(said.find("sign"), std::string::npos) << cells << ": " << said;
+  }
+}
+
 /// Rows of one group each, by the propeller's convention.
 std::string found_of_table(const std::vector<double>& c_t, Convention convention = Convention::kPropeller) {
   TableReduction reduction{.name = "", .convention = convention, .rows = {}, .groups = {}};

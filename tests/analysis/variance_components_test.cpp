@@ -1,5 +1,6 @@
 #include "analysis/variance_components.h"
 
+#include "analysis/restricted_likelihood.h"
 #include "calibration/distributions.h"
 #include "support/seeds.h"
 
@@ -174,6 +175,53 @@ TEST(VarianceComponents, TheirCovarianceIsTheInverseInformation) {
       (p_session * p_session).trace();
   const Eigen::Matrix2d expected = (0.5 * information).inverse();
   EXPECT_LT((found.covariance - expected).norm(), 1e-9 * expected.norm());
+}
+
+/// With all matrices written out: X the locations, V the variance of the visits' means.
+double likelihood_written_out(const VisitDesign& design, double visit, double session) {
+  const auto n = static_cast<Eigen::Index>(design.visits.size());
+  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(design.locations)),
+                  z = Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(design.sessions));
+  Eigen::VectorXd y(n);
+  for (Eigen::Index v = 0; v < n; ++v) {
+    const LocationVisit& here = design.visits[static_cast<std::size_t>(v)];
+    x(v, static_cast<Eigen::Index>(here.location)) = z(v, static_cast<Eigen::Index>(here.session)) = 1;
+    y(v) = here.mean;
+  }
+  const Eigen::MatrixXd variance = visit * Eigen::MatrixXd::Identity(n, n) + session * z * z.transpose();
+  const Eigen::MatrixXd w = variance.inverse(), information = x.transpose() * w * x;
+  const Eigen::VectorXd rest = y - x * (information.inverse() * (x.transpose() * (w * y)));
+  return -0.5 * (std::log(variance.determinant()) + std::log(information.determinant()) + rest.dot(w * rest));
+}
+
+TEST(VarianceComponents, TheLikelihoodIsThatOfItsMatricesOfFewSessionsAndOfMany) {
+  std::mt19937_64 engine(21);
+  std::normal_distribution<double> unit;
+  for (const std::size_t sessions : {4, 19}) {
+    VisitDesign design{.visits = {}, .locations = 7, .sessions = sessions};
+    for (std::size_t s = 0; s < sessions; ++s)
+      for (std::size_t l = 0; l < design.locations; ++l)
+        if ((3 * s + l) % 4 != 0)
+          design.visits.push_back({.location = l, .session = s, .runs = 1, .mean = 5 + unit(engine)});
+    const VarianceComponents none;
+    const RestrictedLikelihood likelihood(design, none);
+    for (const auto& [visit, session] : {std::pair(0.3, 2.0), {1.5, 0.1}, {0.7, 0.0}})
+      EXPECT_NEAR(likelihood(visit, session), likelihood_written_out(design, visit, session), 1e-8)
+          << sessions << " sessions";
+  }
+}
+
+TEST(VarianceComponents, FourTimesTheSessionsTakeFourTimesAsLong) {
+  std::mt19937_64 engine(9);
+  const auto seconds = [&](std::size_t sessions) {
+    const GroupedRuns runs =
+        simulate({.locations = 12, .sessions = sessions, .per_visit = 1, .visits = sessions / 2}, 0.3, 0.2,
+                 0.5, engine);
+    const auto begin = std::chrono::steady_clock::now();
+    fit_variance_components(runs);
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  EXPECT_LT(seconds(400) / seconds(100), 16) << "64 where matrices of sessions are factored at every step";
 }
 
 TEST(VarianceComponents, ThreeTimesTheVisitsTakeThreeTimesAsLong) {

@@ -39,9 +39,27 @@ struct FailedWrites : testing::Test {
 TEST_F(FailedWrites, OfAnImport) {
   test::ExampleCampaign().write(folder / "source", 20000);
   const ProgramResult result = test::run_program(folder.path(), "import source --db c.db", kLittleRoom);
-  EXPECT_EQ(result.code, 1);
+  EXPECT_EQ(result.code, 2);
   EXPECT_THAT(result.error, HasSubstr("disk I/O error: is the disk full"));
   EXPECT_THAT(left(), testing::ElementsAre("source"));
+}
+
+TEST_F(FailedWrites, OfARecordingSayWhatIsKept) {
+  const auto log = [&](const char* room) {
+    return test::run_program(folder.path(),
+                             "log --db c.db --location OT --session S1 --duration 1000 --speed max", room);
+  };
+  for (const char* room : {"ulimit -f 100", "ulimit -f 400", "ulimit -f 900"}) {  // the schema, the first row
+    const ProgramResult result = log(room);
+    EXPECT_EQ(result.code, 2) << room;
+    EXPECT_THAT(result.error, HasSubstr("Nothing was recorded, and there is no c.db.")) << room;
+    EXPECT_THAT(left(), testing::IsEmpty()) << room;
+  }
+  ASSERT_EQ(test::run_program(folder.path(), "log --db c.db --location OT --session S1 --duration 1").code,
+            0);
+  const ProgramResult result = log("ulimit -f 9000");
+  EXPECT_EQ(result.code, 2);
+  EXPECT_THAT(result.error, HasSubstr("The run ends here as partial; everything before it is safe."));
 }
 
 TEST_F(FailedWrites, ACampaignFileThatCannotBeOpenedForLackOfRoomIsNotCalledDamaged) {
@@ -153,6 +171,20 @@ TEST_F(FailedWrites, OfAReductionAreSeenBeforeOneGoesOverTheOther) {
       test::run_program(folder.path(), "reduce --db c.db --csv a.csv --runs-csv ./a.csv");
   EXPECT_EQ(result.code, 2);
   EXPECT_THAT(result.error, HasSubstr("--runs-csv ./a.csv: the same place as --csv a.csv"));
+}
+
+TEST_F(FailedWrites, OfAnExplanationAreSeenBeforeTheSearch) {
+  write_text(folder / "a.json", "kept");
+  for (const auto& [options, why] :
+       {std::pair("--json none/e.json", "none/e.json: cannot be written: there is no folder none"),
+        {"--html none/e.html", "none/e.html: cannot be written: there is no folder none"},
+        {"--json a.json --html ./a.json", "--html ./a.json: the same place as --json a.json"}}) {
+    const ProgramResult result =
+        test::run_program(folder.path(), fmt::format("explain --db none.db {}", options));
+    EXPECT_EQ(result.code, 2) << options;
+    EXPECT_THAT(result.error, HasSubstr(why));
+  }
+  EXPECT_THAT(left(), testing::ElementsAre("a.json"));
 }
 
 /// Tuning or flying first would take much longer than this test may.

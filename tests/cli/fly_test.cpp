@@ -147,6 +147,7 @@ TEST_F(Fly, OutHoldsLogsTablesAndPictures) {
   EXPECT_EQ(read_csv(folder / "flights/comparison.csv").rows.size(), 1U);
   for (const char* file : {"path.svg", "path.png", "error-y.svg", "error-z.png"})
     EXPECT_GT(std::filesystem::file_size(folder / "flights" / file), 500U) << file;
+  EXPECT_NE(read_text(folder / "flights/path.svg").find("vehicle at the start"), std::string::npos);
 }
 
 TEST_F(Fly, WhatWasFlownBeforeIntoTheSameFolderGoes) {

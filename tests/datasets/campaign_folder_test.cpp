@@ -3,6 +3,7 @@
 #include "analysis/run_summary.h"
 #include "datasets/error.h"
 #include "datasets/raw_store.h"
+#include "datasets/sqlite.h"
 #include "datasets/statistics_store.h"
 #include "support/example_campaign.h"
 #include "support/message_of.h"
@@ -82,6 +83,17 @@ TEST_F(Folder, ExportGivesBackEveryByte) {
   const CampaignFile file(db, CampaignFile::Access::kRead);
   export_campaign_folder(file, folder / "out", {});
   EXPECT_EQ(contents(folder / "out"), contents(source));
+}
+
+TEST_F(Folder, ARunThatIsBeingRecordedIsNamedAndExcluded) {
+  campaign.write(source);
+  import_campaign_folder(source, db, options());
+  const CampaignFile file(db, CampaignFile::Access::kWrite);
+  EXPECT_THAT(export_campaign_folder(file, folder / "whole", {}), testing::IsEmpty());
+  file.database().execute("UPDATE raw_runs SET state = 'recording', hash = '' WHERE run = 'R2'");
+  EXPECT_THAT(export_campaign_folder(file, folder / "out", {}), testing::ElementsAre("R2"));
+  EXPECT_THAT(read_text(folder / "out/runs.csv"), testing::HasSubstr("its recording is partial"));
+  EXPECT_EQ(read_text(folder / "out/raw/R2.npy"), read_text(source / "raw/R2.npy"));
 }
 
 TEST_F(Folder, GapsComeBackWithTheColumnsThatTheyHad) {

@@ -83,6 +83,24 @@ TEST(Runs, AKnownQuantityInAnotherUnitIsRefusedInPlaceOfOurs) {
     EXPECT_EQ(parse(with(std::string(other) + ",fan")).size(), 1u) << other;
 }
 
+TEST(Runs, SoAreThoseOfACalibrationAndOfPropellers) {
+  EXPECT_THAT(
+      message_of([] {
+        parse_calibration(parse_csv("cell,applied_force_gf,voltage_V\n1,510,1.5\n", "calibration.csv"), 4);
+      }),
+      HasSubstr("calibration.csv:1: column applied_force_gf: this quantity is read as applied_force_N; "
+                "convert it and rename the column"));
+  EXPECT_THAT(message_of([] {
+                parse_calibration(parse_csv("cell,applied_force_N,voltage_mV\n1,5,1500\n", "calibration.csv"),
+                                  4);
+              }),
+              HasSubstr("column voltage_mV: this quantity is read as voltage_V"));
+  EXPECT_THAT(message_of([] {
+                parse_propellers(parse_csv("propeller,rotor,direction,thrust_gf\nA,1,CW,750\n", "p.csv"), 4);
+              }),
+              HasSubstr("p.csv:1: column thrust_gf: this quantity is read as thrust_N"));
+}
+
 TEST(Runs, DaysAreThoseOfTheCalendar) {
   EXPECT_FALSE(parse_utc("2026-02-30T08:00:00Z").has_value());
   EXPECT_FALSE(parse_utc("2026-02-29T08:00:00Z").has_value());
