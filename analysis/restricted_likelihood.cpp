@@ -56,6 +56,7 @@ double likelihood_by_locations(const VisitDesign& design, const std::vector<Loca
   const auto locations = static_cast<Eigen::Index>(design.locations);
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(locations, locations);  // Xᵀ V⁻¹ X, its lower half
   Eigen::VectorXd right = Eigen::VectorXd::Zero(locations);              // Xᵀ V⁻¹ y
+  std::vector<bool> visited(design.locations, false);
   double log_determinants = 0, squares = 0;
   std::vector<double> weight;
   for (std::size_t from = 0, to = 0; from < by_session.size(); from = to) {
@@ -77,13 +78,14 @@ double likelihood_by_locations(const VisitDesign& design, const std::vector<Loca
       const auto row = static_cast<Eigen::Index>(by_session[i].location);
       const double w = weight[i - from];
       right(row) += w * (by_session[i].mean - shared * weighted);
+      visited[by_session[i].location] = true;
       normal(row, row) += w;
       for (std::size_t j = from; j <= i; ++j)  // in order of location
         normal(row, static_cast<Eigen::Index>(by_session[j].location)) -= shared * w * weight[j - from];
     }
   }
   for (Eigen::Index l = 0; l < locations; ++l)
-    if (normal(l, l) <= 0) normal(l, l) = 1;  // never visited
+    if (!visited[static_cast<std::size_t>(l)]) normal(l, l) = 1;
   const Eigen::LLT<Eigen::MatrixXd> factor(normal);
   for (Eigen::Index l = 0; l < locations; ++l) log_determinants += 2 * std::log(factor.matrixL()(l, l));
   squares -= right.dot(factor.solve(right));

@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <set>
+#include <string>
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -81,17 +83,30 @@ int run_one(const LogOptions& options) {
   return logging.record(asked, "");
 }
 
-/// Of a recording that a full disk has ended.
-std::string what_is_kept(const std::string& db) {
+/// Names of the runs that the file holds; none where there is none, or it cannot be read.
+std::set<std::string> runs_in(const std::string& db) {
+  std::set<std::string> names;
+  std::error_code error;
+  if (!std::filesystem::exists(db, error)) return names;
+  try {
+    for (const RawRun& run : raw_runs(CampaignFile(db, CampaignFile::Access::kRead))) names.insert(run.run);
+  } catch (const std::runtime_error&) {  // whoever records to it says why
+    return names;
+  }
+  return names;
+}
+
+/// Of a recording that a full disk has ended. `before`: runs that were there before it.
+std::string what_is_kept(const std::string& db, const std::set<std::string>& before) {
   std::error_code error;
   if (!std::filesystem::exists(db, error))
     return fmt::format("Nothing was recorded, and there is no {}.", db);
   try {
     const CampaignFile file(db, CampaignFile::Access::kRead);
     for (const RawRun& run : raw_runs(file))
-      if (run.state == RunState::kRecording && run.frames > 0)
+      if (!before.contains(run.run) && run.state == RunState::kRecording && run.frames > 0)
         return "The run ends here as partial; everything before it is safe.";
-    return "Nothing of this run was recorded; everything before it is safe.";
+    return "What was recorded until then is safe.";
   } catch (const std::runtime_error&) {  // even to read takes some room
     return "What was recorded until then is safe.";
   }
@@ -105,6 +120,7 @@ int run_log(const LogOptions& options, const CLI::App& verb) {
         fmt::format("--duration {:g}: seconds, above 0, at most {:g}", options.duration_s, kLongestRun_s));
   if (!options.listen.empty() && !options.live_port)
     throw InputError("--listen says from where the live page can be reached; it goes with --live");
+  const std::set<std::string> before = runs_in(options.db);
   std::signal(SIGINT, stop_on_signal);
   std::signal(SIGTERM, stop_on_signal);
   std::signal(SIGPIPE, SIG_IGN);  // whoever reads --capture by a pipe may end before the recording does
@@ -114,7 +130,7 @@ int run_log(const LogOptions& options, const CLI::App& verb) {
   } catch (const StorageError& error) {
     if (!error.disk_full()) throw;
     throw StorageError(fmt::format("the disk is full ({}). {} Make room and log again.", error.what(),
-                                   what_is_kept(options.db)),
+                                   what_is_kept(options.db, before)),
                        true);
   }
 }

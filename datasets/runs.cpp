@@ -263,9 +263,12 @@ namespace {
 
 /// A required column that stands there in another unit.
 void require_in_our_unit(const Sheet& sheet, std::string_view ours) {
-  const std::string_view quantity = ours.substr(0, ours.rfind('_'));
+  const std::string_view quantity = ours.substr(0, ours.rfind('_') + 1);
+  const auto is_other_unit = [&](const std::string& column) {  // voltage_mV, and no voltage_offset_mV
+    return column.starts_with(quantity) && column.find('_', quantity.size()) == std::string::npos;
+  };
   for (const std::string& column : sheet.columns)
-    if (!sheet.find(ours) && column.starts_with(quantity))
+    if (!sheet.find(ours) && is_other_unit(column))
       throw InputError::at(sheet.file, 1,
                            "column {}: this quantity is read as {}; convert it and rename the column", column,
                            ours);

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kScratch = ".scratch-", kAnyName = "XXXXXX";
+constexpr std::string_view kScratch = ".tunnelrig-scratch-", kAnyName = "XXXXXX";
 
 int open_folder(const fs::path& folder) {
   return ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
@@ -30,6 +30,18 @@ bool still_there(int fd, const fs::path& folder) {
          held.st_dev == named.st_dev;
 }
 
+/// Made by this user as mkdtemp makes it.
+bool is_own(int fd) {
+  struct stat found {};
+  return ::fstat(fd, &found) == 0 && found.st_uid == ::geteuid() && (found.st_mode & 0777) == 0700;
+}
+
+/// Waits for whoever looks at it.
+void lock(int fd) {
+  while (::flock(fd, LOCK_EX) != 0 && errno == EINTR) {
+  }
+}
+
 /// Scratch folders of programs that were killed: the kernel has dropped their locks.
 void remove_abandoned(const fs::path& target) {
   std::error_code error;
@@ -38,7 +50,7 @@ void remove_abandoned(const fs::path& target) {
     if (!name.starts_with(kScratch) || name.size() != kScratch.size() + kAnyName.size()) continue;
     const int fd = open_folder(entry.path());
     if (fd < 0) continue;
-    if (::flock(fd, LOCK_EX | LOCK_NB) == 0) fs::remove_all(entry.path(), error);
+    if (is_own(fd) && ::flock(fd, LOCK_EX | LOCK_NB) == 0) fs::remove_all(entry.path(), error);
     ::close(fd);
   }
 }
@@ -57,9 +69,10 @@ Staging::Staging(const fs::path& target, const std::string& what) : target_(targ
     }
     path_ = name;
     lock_ = open_folder(path_);
-    if (lock_ < 0) return;
-    ::flock(lock_, LOCK_EX);
     // Between its making and its lock another program may have taken it for abandoned.
+    if (lock_ < 0 && errno == ENOENT) continue;
+    if (lock_ < 0) return;
+    lock(lock_);
     if (still_there(lock_, path_)) return;
     ::close(lock_);
   }

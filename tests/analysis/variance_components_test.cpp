@@ -5,7 +5,6 @@
 #include "support/seeds.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -209,36 +208,6 @@ TEST(VarianceComponents, TheLikelihoodIsThatOfItsMatricesOfFewSessionsAndOfMany)
       EXPECT_NEAR(likelihood(visit, session), likelihood_written_out(design, visit, session), 1e-8)
           << sessions << " sessions";
   }
-}
-
-TEST(VarianceComponents, FourTimesTheSessionsTakeFourTimesAsLong) {
-  std::mt19937_64 engine(9);
-  const auto seconds = [&](std::size_t sessions) {
-    const GroupedRuns runs =
-        simulate({.locations = 12, .sessions = sessions, .per_visit = 1, .visits = sessions / 2}, 0.3, 0.2,
-                 0.5, engine);
-    const auto begin = std::chrono::steady_clock::now();
-    fit_variance_components(runs);
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  };
-  EXPECT_LT(seconds(400) / seconds(100), 16) << "64 where matrices of sessions are factored at every step";
-}
-
-TEST(VarianceComponents, ThreeTimesTheVisitsTakeThreeTimesAsLong) {
-  std::mt19937_64 engine(9);
-  const auto seconds = [&](std::size_t locations) {
-    const GroupedRuns runs = simulate({.locations = locations, .sessions = 20, .per_visit = 1, .visits = 20},
-                                      0.3, 0.2, 0.5, engine);
-    double least = 1e9;
-    for (int i = 0; i < 3; ++i) {
-      const auto begin = std::chrono::steady_clock::now();
-      EXPECT_GT(fit_variance_components(runs).covariance(0, 0), 0);
-      least =
-          std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-    }
-    return least;
-  };
-  EXPECT_LT(seconds(150) / seconds(50), 9) << "27 where matrices of visits times visits are multiplied";
 }
 
 TEST(LocationMeans, SharedSessionsCorrelateLocations) {

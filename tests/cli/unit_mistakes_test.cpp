@@ -24,15 +24,18 @@ struct UnitMistakes : testing::Test {
     return test::run_program(folder.path(), arguments);
   }
 
-  /// The example, its calibration's forces times `factor`.
-  ProgramResult import_with_forces_times(double factor) const {
+  /// The example, its calibration's forces (of one cell, or all) times `factor`.
+  ProgramResult import_with_forces_times(double factor, const std::string& of_cell = "") const {
     test::ExampleCampaign campaign;
     const Sheet sheet = parse_csv(campaign.calibration_csv, "calibration.csv");
     campaign.calibration_csv = "cell,applied_force_N,voltage_V\n";
-    for (std::size_t row = 0; row < sheet.rows.size(); ++row)
+    for (std::size_t row = 0; row < sheet.rows.size(); ++row) {
+      const std::string cell = sheet.text(row, "cell");
+      const double times = of_cell.empty() || cell == of_cell ? factor : 1;
       campaign.calibration_csv +=
-          fmt::format("{},{},{}\n", sheet.text(row, "cell"),
-                      factor * sheet.require_number(row, "applied_force_N"), sheet.text(row, "voltage_V"));
+          fmt::format("{},{},{}\n", cell, times * sheet.require_number(row, "applied_force_N"),
+                      sheet.text(row, "voltage_V"));
+    }
     campaign.write(folder / "source");
     return run("import source --db c.db");
   }
@@ -74,6 +77,18 @@ TEST_F(UnitMistakes, ACalibrationInKilograms) {
   const ProgramResult doctor = run("doctor --db c.db");
   EXPECT_EQ(doctor.code, 0);
   EXPECT_THAT(doctor.out, HasSubstr("note     thrusts"));
+}
+
+TEST_F(UnitMistakes, ACellOfTheWrongSign) {
+  EXPECT_EQ(import_with_forces_times(-1, "1").code, 0);
+  run("calibrate --db c.db");
+  const auto said = AllOf(HasSubstr("rotor 1 gives -"), HasSubstr("with the wrong sign?"));
+  const ProgramResult reduced = run("reduce --db c.db");
+  EXPECT_EQ(reduced.code, 1);
+  EXPECT_THAT(reduced.error, said);
+  const ProgramResult doctor = run("doctor --db c.db");
+  EXPECT_EQ(doctor.code, 1);
+  EXPECT_THAT(doctor.out, said);
 }
 
 TEST_F(UnitMistakes, ATableWhoseDiameterIsInAnotherUnit) {

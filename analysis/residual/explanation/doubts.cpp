@@ -47,14 +47,19 @@ void warn_of_doubts(Explanation& explanation) {
           fmt::format("{}: its {} is {:.4g} to {:.4g}, and theory says {:.4g}: something else goes with it",
                       adopted.term.label(), amplitude.name, amplitude.low, amplitude.high, *theory));
   }
-  constexpr double kFarAbove =
-      3;  // of the error: its interval may reach as far, where a few rows are all of it
-  if (explanation.noise_floor >
-      std::min(explanation.after.held_out_high, kFarAbove * explanation.after.held_out_rmse))
+  constexpr double kFarAbove = 3;
+  const double error = explanation.after.held_out_rmse;
+  if (explanation.noise_floor > explanation.after.held_out_high)
     explanation.warnings.emplace_back(
-        "the noise floor is far above the error: the sealed blocks are calm by chance (in one campaign of "
-        "twenty-five without any fault), or the rows scatter less evenly than its variances can follow (a "
-        "stretch of gross ones, of which suspect_rows need not have any), and it is too high");
+        "the noise floor is above all of the error's interval: the sealed blocks are calm by chance (in one "
+        "campaign of twenty-five without any fault), or the rows scatter less evenly than its variances can "
+        "follow, and it is too high");
+  else if (explanation.noise_floor > kFarAbove * error)  // whose interval reaches that far by a few rows
+    explanation.warnings.push_back(fmt::format(
+        "the noise floor is {:.2g} times the error: a stretch of open rows is far off, of which "
+        "suspect_rows need not have any, or scatters far more than the rest, and the floor is too "
+        "high",
+        explanation.noise_floor / error));
   const SealedErrors& sealed = explanation.sealed;
   const bool worse = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
   if (worse && sealed.all < std::min(sealed.curves, explanation.before.held_out_rmse)) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -48,6 +50,14 @@ std::string parameters_in_words(const AdoptedEffect& adopted) {
   return text;
 }
 
+/// The only name that the search held against the data; empty: there are others.
+std::string only_name_tried(const Explanation& e) {
+  std::set<std::string> names;
+  if (!e.rounds.empty())
+    for (const Ranked& ranked : e.rounds[0].ranking) names.insert(ranked.term.effect->name);
+  return names.size() == 1 ? *names.begin() : "";
+}
+
 std::string detectable_in_words(const Explanation& e, const std::string& unit) {
   std::string text = fmt::format("no effect above {:.3g}{} (rms) at 80 % power", e.detectable, unit);
   if (e.detectable_by_effect.size() > 1) {
@@ -56,8 +66,8 @@ std::string detectable_in_words(const Explanation& e, const std::string& unit) {
                             [](const auto& a, const auto& b) { return a.second < b.second; });
     text += fmt::format("; {} would have been seen from {:.3g}{}, {} from {:.3g}{}", least->first,
                         least->second, unit, most->first, most->second, unit);
-  } else if (e.detectable_by_effect.size() == 1) {
-    text += fmt::format("; these data test no name but {}", e.detectable_by_effect.begin()->first);
+  } else if (const std::string name = only_name_tried(e); !name.empty()) {
+    text += fmt::format("; these data test no name but {}", name);
   }
   return text + "\n";
 }

@@ -1,6 +1,7 @@
 #include "analysis/residual/likelihood/baseline_normal.h"
 
 #include <cmath>
+#include <limits>
 
 #include <Eigen/SparseCholesky>
 
@@ -29,6 +30,7 @@ BaselineNormal::BaselineNormal(const NormalParts& parts, double session_ratio)
   Eigen::SparseMatrix<double> equations(all, all);
   equations.setFromTriplets(entries.begin(), entries.end());
   factor_->cholesky.compute(equations);
+  if (factor_->cholesky.info() != Eigen::Success) log_determinant_ = std::numeric_limits<double>::quiet_NaN();
   log_determinant_ += 2 * factor_->cholesky.matrixL().nestedExpression().diagonal().array().log().sum();
 }
 
@@ -37,6 +39,8 @@ BaselineNormal& BaselineNormal::operator=(BaselineNormal&&) noexcept = default;
 BaselineNormal::~BaselineNormal() = default;
 
 MatrixXd BaselineNormal::solve(const Eigen::Ref<const MatrixXd>& right) const {
+  if (factor_->cholesky.info() != Eigen::Success)  // of what is no number
+    return MatrixXd::Constant(right.rows(), right.cols(), std::numeric_limits<double>::quiet_NaN());
   MatrixXd whole = MatrixXd::Zero(factor_->cholesky.rows(), right.cols());
   whole.topRows(columns_) = right;
   return MatrixXd(factor_->cholesky.solve(whole)).topRows(columns_);

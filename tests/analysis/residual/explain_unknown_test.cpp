@@ -180,12 +180,14 @@ TEST_F(ExplainTest, ACourseThatEveryRunHasIsNoScatterOfSessions) {
   }
 }
 
+/// "No effect above …" of one name is no statement about the others.
 TEST_F(ExplainTest, WhereOneNameAloneIsTestedItIsSaid) {
-  Explanation e = explained(observations(16));
-  ASSERT_TRUE(e.adopted.empty());
-  e.verdict = "no_structure";
-  e.detectable_by_effect = {{"nonlinearity", 0.1}};
-  EXPECT_THAT(explanation_text(e), HasSubstr("these data test no name but nonlinearity"));
+  const Observations o = observations(16);
+  const std::vector<const Effect*> one = {&test::effect_named("supply_voltage")};
+  const Explanation of_one = explain(o, one, quick());
+  ASSERT_EQ(of_one.verdict, "no_structure") << explanation_text(of_one);
+  EXPECT_THAT(explanation_text(of_one), HasSubstr("these data test no name but supply_voltage"));
+  EXPECT_THAT(explanation_text(explained(o)), testing::Not(HasSubstr("no name but")));
 }
 
 }  // namespace

@@ -100,18 +100,17 @@ TEST_F(TableDoubts, AFewRowsTellAFloorAsWellAsTheyCan) {
 
 /// Where a few rows are all of the error, its interval reaches as far as any floor.
 TEST(Doubts, AFloorFarAboveTheErrorIsSaid) {
-  const auto said = Contains(HasSubstr("the noise floor is far above the error"));
-  for (const double floor : {1.5, 60.0}) {
+  const auto warnings_at = [](double floor, double held_out_high) {
     Explanation e;
     e.noise_floor = floor;
     e.before.held_out_rmse = e.after.held_out_rmse = 1;
-    e.after.held_out_high = 100;
+    e.after.held_out_high = held_out_high;
     warn_of_doubts(e);
-    if (floor > 3)
-      EXPECT_THAT(e.warnings, said);
-    else
-      EXPECT_THAT(e.warnings, testing::Not(said));
-  }
+    return e.warnings;
+  };
+  EXPECT_THAT(warnings_at(60, 100), Contains(HasSubstr("the noise floor is 60 times the error")));
+  EXPECT_THAT(warnings_at(1.5, 1.4), Contains(HasSubstr("above all of the error's interval")));
+  EXPECT_THAT(warnings_at(1.5, 100), testing::Not(Contains(HasSubstr("floor"))));
 }
 
 /// One gust in which one row is far off tells nothing of what wind does, whichever rows are held out.
