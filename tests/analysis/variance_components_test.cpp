@@ -196,7 +196,7 @@ double likelihood_written_out(const VisitDesign& design, double visit, double se
 TEST(VarianceComponents, TheLikelihoodIsThatOfItsMatricesOfFewSessionsAndOfMany) {
   std::mt19937_64 engine(21);
   std::normal_distribution<double> unit;
-  for (const std::size_t sessions : {4, 19}) {
+  for (const std::size_t sessions : {std::size_t{4}, std::size_t{19}}) {
     VisitDesign design{.visits = {}, .locations = 7, .sessions = sessions};
     for (std::size_t s = 0; s < sessions; ++s)
       for (std::size_t l = 0; l < design.locations; ++l)
