@@ -53,15 +53,28 @@ const KnownColumn* known_column(std::string_view name) {
   return found == kKnown.end() ? nullptr : found;
 }
 
+[[noreturn]] void refuse_unit(const Sheet& sheet, const std::string& column, std::string_view ours) {
+  throw InputError::at(sheet.file, 1,
+                       "column {}: this quantity is read as {}; convert it and rename the column", column,
+                       ours);
+}
+
 /// Such a column in place of ours is a mistake, not a covariate. A distance may be the label's, as radii.
 void check_units(const Sheet& sheet) {
   for (const std::string& column : sheet.columns) {
     const std::string_view ours = in_our_unit(column);
     if (known_column(ours) == nullptr || ours.ends_with("_R") || sheet.find(ours)) continue;
-    throw InputError::at(sheet.file, 1,
-                         "column {}: this quantity is read as {}; convert it and rename the column", column,
-                         ours);
+    refuse_unit(sheet, column, ours);
   }
+}
+
+/// Of another sheet, a required column that stands there in another unit.
+void require_in_our_unit(const Sheet& sheet, std::string_view ours) {
+  if (sheet.find(ours)) return;
+  const std::string_view quantity = ours.substr(0, ours.rfind('_') + 1);
+  for (const std::string& column : sheet.columns)  // voltage_mV, and no voltage_offset_mV
+    if (column.starts_with(quantity) && column.find('_', quantity.size()) == std::string::npos)
+      refuse_unit(sheet, column, ours);
 }
 
 /// Numbers among what may be no number; labels else.
@@ -258,23 +271,6 @@ std::vector<Run> parse_runs(const Sheet& sheet, const CampaignInfo& campaign) {
   }
   return runs;
 }
-
-namespace {
-
-/// A required column that stands there in another unit.
-void require_in_our_unit(const Sheet& sheet, std::string_view ours) {
-  const std::string_view quantity = ours.substr(0, ours.rfind('_') + 1);
-  const auto is_other_unit = [&](const std::string& column) {  // voltage_mV, and no voltage_offset_mV
-    return column.starts_with(quantity) && column.find('_', quantity.size()) == std::string::npos;
-  };
-  for (const std::string& column : sheet.columns)
-    if (!sheet.find(ours) && is_other_unit(column))
-      throw InputError::at(sheet.file, 1,
-                           "column {}: this quantity is read as {}; convert it and rename the column", column,
-                           ours);
-}
-
-}  // namespace
 
 std::vector<CalibrationPoint> parse_calibration(const Sheet& sheet, int rotors) {
   for (const char* ours : {"applied_force_N", "voltage_V"}) require_in_our_unit(sheet, ours);
