@@ -143,19 +143,23 @@ const timesText = (times) => times ?
     ` in proportion to how far \`${times}\` is from its mean (amplitude: where that is farthest)` :
     '';
 
+const namesText = (unknown, onAllBlocks) => (unknown.could_be ?? [])
+    .filter((name) => Boolean(name.on_all_blocks) === onAllBlocks)
+    .map((name) => `${name.effect}${name.rotor ? ` at rotor ${name.rotor}` : ''}${
+        name.at_theory ? ' at theory’s coefficient' : ''}`)
+    .join(', or ');
+
 const unknownText = (unknown, unit) => {
   const {covariate, place, times, rotor, amplitude, p_value: p, instead_of: insteadOf = []} = unknown;
   const bySealed = unknown.by_sealed_too ?
       ' The blocks that were not sealed are too few to show it, so it is in no error, and is not adopted as a curve.' :
       '';
-  const couldBe = (unknown.could_be ?? []).map(
-      (name) => `${name.effect}${name.rotor ? ` at rotor ${name.rotor}` : ''}${
-          name.at_theory ? ' at theory’s coefficient' : ''}`);
-  const names = couldBe.length ?
-      ` ${couldBe.join(', or ')} ${unknown.by_sealed_too ?
-          'would do as well, and could not be scored any more: more sessions would tell' :
-          'may have a part in it: found before it, and not beyond chance beside it'}.` :
-      '';
+  const given = namesText(unknown, false);
+  const ofAll = namesText(unknown, true);
+  const names = `${given ? ` ${given} may have a part in it: found before it, and not beyond chance beside it.` : ''}${
+      ofAll ? `${unknown.by_sealed_too ? '' : ' With the sealed blocks in,'} ${
+                  ofAll} would do as well, and could not be scored any more: more sessions would tell.` :
+              ''}`;
   const twins = unknown.collinear_with?.length ? ` Not to be told from ${unknown.collinear_with.join(', ')}.` : '';
   const where = `${rotor ? ` at rotor ${rotor}` : ''}${placeText(place)}${timesText(times)}`;
   return `Depends on \`${covariate}\`${where}: amplitude ${digits(amplitude)}${

@@ -50,10 +50,12 @@ void number_change_points(const Observations& observations, const std::vector<Pr
   }
 }
 
-/// Names are settled, but a structure that the open blocks are too few for is one all the same.
+/// Names are settled, but a structure that the open blocks are too few for is one all the same, and so is
+/// what they are too few to name.
 void report_structure_left(const StructureLeft& left, const Observations& observations,
                            const std::vector<int>& rows, Explanation& explanation) {
   for (const std::size_t t : left.bent) explanation.adopted[t].bends_away = true;
+  for (std::size_t c = 0; c < left.names.size(); ++c) explanation.unknown[c].could_be = left.names[c];
   for (const FoundCurve& curve : left.curves) {
     explanation.unknown.push_back(describe(observations, left.fit, curve, rows));
     explanation.unknown.back().by_sealed_too = true;

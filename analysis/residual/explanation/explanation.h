@@ -78,7 +78,7 @@ struct UnknownStructure {
   bool by_sealed_too = false;               // the open blocks alone do not show it
   bool in_some_runs = false;                // found in those that have the condition
   std::vector<std::string> collinear_with;  // other conditions that it may be as well
-  std::vector<Term> could_be;  // names that go with it so nearly, or come so late, that none is given
+  std::vector<CouldBe> could_be;  // names that go with it so nearly, or come so late, that none is given
 
   /// Whether it is a curve that the model can have, and errors can be given with.
   bool is_curve_of_model() const {

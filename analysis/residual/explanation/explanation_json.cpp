@@ -53,9 +53,11 @@ Json unknown_json(const UnknownStructure& unknown) {
   for (const ShapePoint& point : unknown.shape)
     shape.push_back({finite(point.x), finite(point.y), finite(point.low), finite(point.high)});
   Json could_be = Json::array();
-  for (const Term& term : unknown.could_be)
-    could_be.push_back(
-        {{"effect", term.effect->name}, {"rotor", rotor_json(term.rotor)}, {"at_theory", term.at_theory}});
+  for (const auto& [term, on_all_blocks] : unknown.could_be)
+    could_be.push_back({{"effect", term.effect->name},
+                        {"rotor", rotor_json(term.rotor)},
+                        {"at_theory", term.at_theory},
+                        {"on_all_blocks", on_all_blocks}});
   return {{"covariate", unknown.covariate},
           {"covariate_unit", unknown.covariate_unit},
           {"place", unknown.place.empty() ? Json(nullptr) : Json(unknown.place)},

@@ -99,16 +99,26 @@ std::string in_words(const AdoptedEffect& a) {
   return text;
 }
 
-std::string could_be_in_words(const UnknownStructure& u) {
+std::string names_in_words(const UnknownStructure& u, bool on_all_blocks) {
   std::vector<std::string> names;
-  for (const Term& term : u.could_be)
-    names.push_back(term.effect->name + (term.rotor < 0 ? "" : fmt::format(" of rotor {}", term.rotor + 1)) +
-                    (term.at_theory ? " at theory's coefficient" : ""));
-  if (!u.by_sealed_too)
-    return fmt::format("{} may have a part in it: found before it, and not beyond chance beside it",
-                       fmt::join(names, ", or "));
-  return fmt::format("{} would do as well, and could not be scored any more: more sessions would tell",
-                     fmt::join(names, ", or "));
+  for (const auto& [term, of_all] : u.could_be)
+    if (of_all == on_all_blocks)
+      names.push_back(term.effect->name +
+                      (term.rotor < 0 ? "" : fmt::format(" of rotor {}", term.rotor + 1)) +
+                      (term.at_theory ? " at theory's coefficient" : ""));
+  return fmt::format("{}", fmt::join(names, ", or "));
+}
+
+std::string could_be_in_words(const UnknownStructure& u) {
+  std::string text;
+  if (const std::string names = names_in_words(u, false); !names.empty())
+    text += wrapped(
+        fmt::format("  {} may have a part in it: found before it, and not beyond chance beside it", names));
+  if (const std::string names = names_in_words(u, true); !names.empty())
+    text += wrapped(
+        fmt::format("  {}{} would do as well, and could not be scored any more: more sessions would tell",
+                    u.by_sealed_too ? "" : "with the sealed blocks in, ", names));
+  return text;
 }
 
 std::string in_words(const UnknownStructure& u, const std::string& unit) {
@@ -128,7 +138,7 @@ std::string in_words(const UnknownStructure& u, const std::string& unit) {
   if (!u.collinear_with.empty())
     text += wrapped(
         fmt::format("  not to be told from {}, which goes with it", fmt::join(u.collinear_with, ", ")));
-  if (!u.could_be.empty()) text += wrapped("  " + could_be_in_words(u));
+  text += could_be_in_words(u);
   if (!u.instead_of.empty())
     text += fmt::format("    in which it bends away from the formula of {}\n", fmt::join(u.instead_of, ", "));
   return text;

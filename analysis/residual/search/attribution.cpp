@@ -7,6 +7,7 @@
 #include "analysis/residual/search/curve_steps.h"
 #include "analysis/residual/search/curve_work.h"
 #include "analysis/residual/search/effect_steps.h"
+#include "analysis/residual/search/fits.h"
 #include "analysis/residual/search/group_amplitudes.h"
 #include "analysis/residual/search/rivals.h"
 #include "analysis/residual/search/scatter_beside.h"
@@ -66,9 +67,9 @@ void measure_gains(const SearchData& data, Found& found) {
 
 /// What gave way to a curve, and then to another name over the same condition, may not be it any more.
 void forget_what_has_a_name(const Observations& observations, Found& found) {
-  const auto has = [&](const Term& term) {
+  const auto has = [&](const CouldBe& name) {
     return std::ranges::any_of(found.accepted, [&](const Accepted& accepted) {
-      return share_a_condition(*accepted.term.effect, *term.effect, observations);
+      return share_a_condition(*accepted.term.effect, *name.term.effect, observations);
     });
   };
   const auto is_named = [&](const std::string& name) {
@@ -88,6 +89,24 @@ std::set<std::size_t> outshone(const SearchData& data, const Found& found) {
     if (!found.accepted[t].term.per_group && outshone_by_curve(data, found, found.accepted[t].term))
       result.insert(t);
   return result;
+}
+
+/// What all blocks have for curve c, and the open ones have not refused. `without`: the fit without it.
+std::vector<CouldBe> names_on_all(SearchState& state, std::size_t c, const JointFit& without,
+                                  const Attribution& before) {
+  const FoundCurve& curve = state.found.curves[c];
+  const auto is_refused = [&](const std::string& name) {
+    return std::ranges::count(curve.instead_of, name) > 0 ||
+           std::ranges::any_of(curve.could_be,
+                               [&](const CouldBe& given) { return given.term.effect->name == name; }) ||
+           // With its own size it would be outside of physics here too.
+           std::ranges::any_of(before.beyond_bounds,
+                               [&](const BeyondBounds& beyond) { return beyond.term.effect->name == name; });
+  };
+  std::vector<CouldBe> names = curve.could_be;
+  for (const Term& term : names_of_curve(state.data, state.found, c, without, state.questions))
+    if (!is_refused(term.effect->name)) names.push_back({.term = term, .on_all_blocks = true});
+  return names;
 }
 
 }  // namespace
@@ -138,14 +157,10 @@ StructureLeft structure_left(const Attribution& before, const JointFit& whole, c
     const JointFit without = found.fit;
     if (!add_best_curve(state, scan_curves(data, found))) break;
     left.bent.merge(outshone(data, found));
-    std::vector<Term> names = names_of_newest_curve(data, found, without, state.questions);
-    std::erase_if(names, [&](const Term& term) {  // with its own size it would be outside of physics here too
-      return std::ranges::any_of(before.beyond_bounds, [&](const BeyondBounds& refused) {
-        return refused.term.effect->name == term.effect->name;
-      });
-    });
-    found.curves.back().could_be = std::move(names);
+    found.curves.back().could_be = names_on_all(state, found.curves.size() - 1, without, before);
   }
+  for (std::size_t c = 0; few && c < before.curves.size(); ++c)
+    left.names.push_back(names_on_all(state, c, fit_without_curve(data, found.fit, c), before));
   smooth_curves(data, found, before.curves.size());
   left.curves = {found.curves.begin() + std::ssize(before.curves), found.curves.end()};
   left.fit = std::move(found.fit);

@@ -57,11 +57,17 @@ struct BeyondBounds {
   double amplitude = 0;  // of its own unit, if nothing held it
 };
 
+/// One way of an effect that may do as well as a curve, and is not accepted.
+struct CouldBe {
+  Term term;
+  bool on_all_blocks = false;  // they let it in; or else it was found before the curve, and given up for it
+};
+
 struct FoundCurve {
   Curve curve;
   double p = 1;
   std::vector<std::string> instead_of;  // effects that were in, until the curve showed their formulas wrong
-  std::vector<Term> could_be = {};      // one way of each effect that may do as well, and is not accepted
+  std::vector<CouldBe> could_be = {};   // one way of each effect
 };
 
 /// Sessions scatter far more than runs.
@@ -112,8 +118,9 @@ Attribution attribute(const Observations& observations, const std::vector<int>& 
 /// Structure without a name that more runs show beside what was found on some of them.
 struct StructureLeft {
   std::vector<FoundCurve> curves;
-  JointFit fit;                // to all `rows`: what was found, and then these curves
-  std::vector<Round> rounds;   // of the search
+  std::vector<std::vector<CouldBe>> names;  // of each curve that was found before, on all `rows`
+  JointFit fit;                             // to all `rows`: what was found, and then these curves
+  std::vector<Round> rounds;                // of the search
   std::set<std::size_t> bent;  // of `accepted`: what its covariate does bends away from its formula
 };
 /// `found` speaks of its own observations, which must outlive the call. `whole`: its model fitted to `rows`,

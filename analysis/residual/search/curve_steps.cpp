@@ -51,7 +51,7 @@ void drop_what_a_curve_replaces(const SearchData& data, Found& found, Questions&
     if (outshone_by_curve(data, found, term)) {
       give_way_to_curve(data, found, t, without);
     } else if (!product && !is_still_found(data, found, term, without, questions)) {
-      found.curves.back().could_be.push_back(term);
+      found.curves.back().could_be.push_back({.term = term});
       found.drop(t, without);
     }
   }
@@ -111,10 +111,7 @@ void smooth_curves(const SearchData& data, Found& found, std::size_t first) {
   for (std::size_t c = first; c < found.curves.size(); ++c) {
     const std::vector<Curve> forms = smooth_forms(data.observations(), found.curves[c].curve, data.rows());
     if (forms.empty()) continue;
-    MeanModel rest = found.fit.model;
-    rest.curves.erase(rest.curves.begin() + static_cast<std::ptrdiff_t>(c));
-    const JointFit without = fit_jointly(data.observations(), rest, data.rows());
-    set_curve(data, found, c, best_of(forms, data, without));
+    set_curve(data, found, c, best_of(forms, data, fit_without_curve(data, found.fit, c)));
   }
 }
 

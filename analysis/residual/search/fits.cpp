@@ -40,6 +40,12 @@ JointFit fit_without(const SearchData& data, const JointFit& base, std::size_t t
   return fit_jointly(data.observations(), base.model.without_term(t), data.rows());
 }
 
+JointFit fit_without_curve(const SearchData& data, const JointFit& base, std::size_t c) {
+  MeanModel model = base.model;
+  model.curves.erase(model.curves.begin() + static_cast<std::ptrdiff_t>(c));
+  return fit_jointly(data.observations(), model, data.rows());
+}
+
 double ratio_p(const SearchData& data, double ratio, const JointFit& fit) {
   Index dof = -static_cast<Index>(fit.linear.columns.size());
   for (std::size_t s = 0; s < data.mixed().strata().size(); ++s) dof += data.mixed().dof(s);

@@ -21,6 +21,9 @@ JointFit fit_with_all(const SearchData& data, const JointFit& base, const std::v
 /// Without term t.
 JointFit fit_without(const SearchData& data, const JointFit& base, std::size_t t);
 
+/// Without curve c.
+JointFit fit_without_curve(const SearchData& data, const JointFit& base, std::size_t c);
+
 /// p of a log likelihood ratio (≥ 0) of one parameter of a fitted model: few rows are no large sample.
 double ratio_p(const SearchData& data, double ratio, const JointFit& fit);
 

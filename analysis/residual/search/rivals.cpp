@@ -117,10 +117,10 @@ std::vector<Ranked> rivals_of(const SearchData& data, const Found& found, std::s
   return rivals(data, found, found.accepted[t], without, scan_effects(data, found, without));
 }
 
-std::vector<Term> names_of_newest_curve(const SearchData& data, const Found& found, const JointFit& without,
-                                        Questions& questions) {
+std::vector<Term> names_of_curve(const SearchData& data, const Found& found, std::size_t c,
+                                 const JointFit& without, Questions& questions) {
   Found before = found;
-  before.curves.pop_back();
+  before.curves.erase(before.curves.begin() + static_cast<std::ptrdiff_t>(c));
   before.set_fit(without);
   const Scan scan = scan_effects(data, before, without);
   const double critical =
@@ -128,7 +128,7 @@ std::vector<Term> names_of_newest_curve(const SearchData& data, const Found& fou
   const NullFit& variances = found.fit.variances;
   const CrossValidation of_curve = unseen(data, found.fit, variances);
   const auto left_of_curve = [&](const JointFit& beside) {
-    const CandidateScan alone(data.mixed(), beside.linear.columns, {as_candidate(found.curves.back().curve)});
+    const CandidateScan alone(data.mixed(), beside.linear.columns, {as_candidate(found.curves[c].curve)});
     return alone.fit(difference(data.y(), beside.linear.offset))[0].likelihood_ratio;
   };
   std::vector<Term> names;

@@ -13,9 +13,9 @@ namespace tunnelrig {
 /// about as well.
 std::vector<Ranked> rivals_of(const SearchData& data, const Found& found, std::size_t t);
 
-/// Effects that step 3 would accept in the newest curve's place, and that predict unseen blocks about as
-/// well. `without`: the fit without the curve.
-std::vector<Term> names_of_newest_curve(const SearchData& data, const Found& found, const JointFit& without,
-                                        Questions& questions);
+/// Effects that step 3 would accept in the place of curve c, and that predict unseen blocks about as well.
+/// `without`: the fit without the curve.
+std::vector<Term> names_of_curve(const SearchData& data, const Found& found, std::size_t c,
+                                 const JointFit& without, Questions& questions);
 
 }  // namespace tunnelrig

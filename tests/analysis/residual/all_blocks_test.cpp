@@ -28,6 +28,16 @@ struct AllBlocks : testing::Test {
     for (Eigen::Index r = 0; r < o.rows(); ++r) value(r, 0) = value(8 * (r / 8), 0);
     return value.col(0);
   }
+
+  /// With what it does: as theory says, or something else.
+  void add_pressure(Observations& o, bool as_theory_says) {
+    const Eigen::VectorXd pressure = of_sessions(o, "air_pressure_Pa", 100700, 101900);
+    const Eigen::ArrayXd s = (pressure.array() - 101300) / 600;
+    if (as_theory_says)
+      test::add_effect(o, "air_pressure", {1});
+    else
+      test::set_y(o, o.y + 0.006 * s.square().matrix().replicate(1, 4));
+  }
 };
 
 /// What varies with the session is seen in few values, of which the seal takes a quarter.
@@ -57,30 +67,43 @@ TEST_F(AllBlocks, WhatTheyAloneShowIsUnknownAndNotScored) {
 /// Where theory does as well as the curve it is said, though it comes too late to be scored; where the
 /// condition does something else, no name is.
 TEST_F(AllBlocks, WhatTheyShowMayHaveAName) {
-  const auto names_of = [&](bool as_theory_says) {
+  const auto curves_of = [&](bool as_theory_says) {
     Observations o = campaign(1);
-    const Eigen::VectorXd pressure = of_sessions(o, "air_pressure_Pa", 100700, 101900);
-    if (as_theory_says) {
-      test::add_effect(o, "air_pressure", {1});
-    } else {
-      const Eigen::ArrayXd s = (pressure.array() - 101300) / 600;
-      test::set_y(o, o.y + 0.006 * s.square().matrix().replicate(1, 4));
-    }
+    add_pressure(o, as_theory_says);
     const std::vector<int> rows = o.all_rows();
     SearchSettings nothing = test::quick();
     nothing.most_effects = nothing.most_curves = 0;
     const Attribution found = attribute(o, rows, {}, nothing);
     return structure_left(found, found.final, rows, test::every_effect(), test::quick()).curves;
   };
-  const std::vector<FoundCurve> as_theory_says = names_of(true), otherwise = names_of(false);
+  const std::vector<FoundCurve> as_theory_says = curves_of(true), otherwise = curves_of(false);
   ASSERT_EQ(as_theory_says.size(), 1u);
   EXPECT_EQ(as_theory_says[0].curve.covariate, "air_pressure_Pa");
   ASSERT_EQ(as_theory_says[0].could_be.size(), 1u);
-  EXPECT_EQ(as_theory_says[0].could_be[0].effect->name, "air_pressure");
-  EXPECT_TRUE(as_theory_says[0].could_be[0].at_theory);
+  EXPECT_EQ(as_theory_says[0].could_be[0].term.effect->name, "air_pressure");
+  EXPECT_TRUE(as_theory_says[0].could_be[0].term.at_theory);
   ASSERT_EQ(otherwise.size(), 1u);
   EXPECT_EQ(otherwise[0].curve.covariate, "air_pressure_Pa");
   EXPECT_TRUE(otherwise[0].could_be.empty());
+}
+
+/// The same of a curve that the open blocks have shown, when they had no name for it.
+TEST_F(AllBlocks, WhatTheOpenOnesShowMayHaveAName) {
+  const auto names_of = [&](bool as_theory_says) {
+    Observations o = campaign(0.3);
+    add_pressure(o, as_theory_says);
+    const std::vector<int> rows = o.all_rows();
+    const Attribution found = attribute(o, rows, {}, test::quick());
+    EXPECT_EQ(found.curves.size(), 1u);
+    return structure_left(found, found.final, rows, test::every_effect(), test::quick()).names;
+  };
+  const auto as_theory_says = names_of(true), otherwise = names_of(false);
+  ASSERT_EQ(as_theory_says.size(), 1u);
+  ASSERT_EQ(as_theory_says[0].size(), 1u);
+  EXPECT_EQ(as_theory_says[0][0].term.effect->name, "air_pressure");
+  EXPECT_TRUE(as_theory_says[0][0].on_all_blocks);
+  ASSERT_EQ(otherwise.size(), 1u);
+  EXPECT_TRUE(otherwise[0].empty());
 }
 
 /// What a rotor does above a temperature and not below is half a line: few sessions do not show its other
