@@ -5,6 +5,7 @@
 #include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/search/attribution.h"
 #include "analysis/residual/search/group_amplitudes.h"
+#include "analysis/residual/search/ways.h"
 
 #include <map>
 #include <optional>

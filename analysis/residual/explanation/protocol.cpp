@@ -1,6 +1,7 @@
 // The protocol, once: seal, search on the open runs, open the seal, estimate on all.
 #include "analysis/residual/explanation/explanation_parts.h"
 #include "analysis/residual/likelihood/scores.h"
+#include "analysis/residual/search/detectable.h"
 #include "calibration/distributions.h"
 #include "datasets/error.h"
 #include "datasets/first_few.h"

@@ -88,30 +88,6 @@ struct Attribution {
   std::map<std::string, double> detectable_by_effect;  // likewise, of each
 };
 
-/// Candidates that can be tried, each in all its ways.
-std::vector<Term> all_ways(const std::vector<const Effect*>& effects, const Observations& observations,
-                           const std::vector<int>& rows);
-
-/// Whether a way would change the forces that the baseline and what is known predict, by more than the
-/// baseline can absorb. What only another effect's changes of the force would show is no evidence of its own.
-class OwnEvidence {
- public:
-  /// Keeps references. `baseline`: alone, of the runs that count.
-  OwnEvidence(const Observations& observations, const MixedModel& baseline);
-  bool operator()(const Term& way) const;
-  /// The first row in which the way has no finite value: a logarithm of zero, for example.
-  std::optional<Eigen::Index> undefined(const Term& way) const;
-
- private:
-  const Observations& observations_;
-  const MixedModel& baseline_;
-  Eigen::MatrixXd predicted_;
-};
-
-/// Where no candidate can be tried: rms, in y, of a single effect on all rotors alike that varies from run to
-/// run, and would be found at 80 % power if it were the only candidate.
-double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha);
-
 Attribution attribute(const Observations& observations, const std::vector<int>& rows,
                       const std::vector<const Effect*>& effects, const SearchSettings& settings);
 

@@ -20,4 +20,8 @@ struct Detectable {
 /// largest, where none of them can be told.
 Detectable detectable_by(const SearchData& data, const Found& found, const Scan& scan, double otherwise);
 
+/// Where no candidate can be tried: rms, in y, of a single effect on all rotors alike that varies from run to
+/// run, and would be found at 80 % power if it were the only candidate.
+double detectable_by_one(const MixedModel& mixed, const NullFit& variances, double alpha);
+
 }  // namespace tunnelrig

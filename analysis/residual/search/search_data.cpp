@@ -1,5 +1,7 @@
 #include "analysis/residual/search/search_data.h"
 
+#include "analysis/residual/search/ways.h"
+
 #include <algorithm>
 #include <cmath>
 #include <utility>

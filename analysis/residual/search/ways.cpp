@@ -1,7 +1,7 @@
-// What can be tried, and what of it the runs can show.
+#include "analysis/residual/search/ways.h"
+
 #include "analysis/residual/likelihood/candidates.h"
 #include "analysis/residual/likelihood/testability.h"
-#include "analysis/residual/search/attribution.h"
 
 #include <utility>
 

@@ -1,5 +1,6 @@
 // False alarms, coverage and recovery over many simulated campaigns.
 #include "analysis/residual/search/attribution.h"
+#include "analysis/residual/search/ways.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 
