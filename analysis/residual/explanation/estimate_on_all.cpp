@@ -89,6 +89,8 @@ void estimate_on_all(const Models& models, const Observations& observations,
   explanation.residual_before = residuals(baseline.data, fit_jointly(baseline.data, {}, rows), rows);
   const HeldOutErrors fitted = score(wide, whole, rows, rows);
   explanation.residual_after = fitted.error;
+  const StructureLeft left = structure_left(found, whole, rows, effects, settings);
+  for (std::size_t t = 0; t < left.confounded.size(); ++t) found.accepted[t].confounded = left.confounded[t];
   report_adopted(wide, found, whole, rows, explanation);
   for (const Profiled& shape : shapes) {
     ParameterEstimate& estimate = explanation.adopted[shape.term].parameters[shape.parameter];
@@ -108,7 +110,7 @@ void estimate_on_all(const Models& models, const Observations& observations,
   warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);
   for (const FoundCurve& curve : found.curves)
     explanation.unknown.push_back(describe(wide, whole, curve, rows));
-  report_structure_left(structure_left(found, whole, rows, effects, settings), wide, rows, explanation);
+  report_structure_left(left, wide, rows, explanation);
   if (found.session_unknown && explanation.unknown.empty())
     explanation.unknown.push_back(
         describe_sessions(observations, fitted.error, *found.session_unknown, rows));

@@ -171,6 +171,19 @@ std::string contradiction(const AdoptedEffect& adopted, const Explanation& expla
   return "";
 }
 
+/// Whether a curve over its own condition is beside a name whose amplitude may be 0: the curve has what it
+/// was found for.
+bool has_given_way(const AdoptedEffect& adopted, const Explanation& explanation,
+                   const Observations& observations) {
+  const ParameterEstimate& amplitude = adopted.parameters[0];
+  if (adopted.term.per_group || amplitude.low > 0 || amplitude.high < 0) return false;
+  const std::vector<std::string> own = own_conditions(*adopted.term.effect, observations);
+  return std::ranges::any_of(explanation.unknown, [&](const UnknownStructure& curve) {
+    return !curve.by_sealed_too && curve.rotor == adopted.term.rotor &&
+           std::ranges::find(own, curve.condition) != own.end();
+  });
+}
+
 /// What speaks against a name.
 struct Against {
   const AdoptedEffect* adopted;
@@ -209,8 +222,9 @@ Refuted refuted(const Explanation& explanation, const Observations& observations
     std::string why = refutation(adopted, observations);
     if (why.empty()) why = contradicted;
     if (why.empty()) continue;
-    const bool never_stays =
-        adopted.at_bound || !contradicted.empty() || !no_more_than_a_line(adopted, observations).empty();
+    const bool never_stays = adopted.at_bound || !contradicted.empty() ||
+                             has_given_way(adopted, explanation, observations) ||
+                             !no_more_than_a_line(adopted, observations).empty();
     against.push_back({&adopted, std::move(why), never_stays});
   }
   Refuted result;

@@ -92,14 +92,12 @@ class RunCovariance {
 /// rest is scored, if there are as many runs as coefficients. `residual` came with NaN there because the
 /// model has no such group: `plain` is the same without any baseline. `covariance`: of what runs scatter;
 /// `columns`: stacked, of amplitudes that have `of_amplitudes`.
-void own_baseline(const Observations& observations, const std::vector<int>& rows,
-                  const RunCovariance& covariance, const MatrixXd& plain, const Stacked& columns,
-                  const MatrixXd& of_amplitudes, MatrixXd& residual, MatrixXd& variance) {
+void fit_own_baselines(const Observations& observations, const std::vector<int>& rows,
+                       const std::vector<OwnBaseline>& own_groups, const RunCovariance& covariance,
+                       const MatrixXd& plain, const Stacked& columns, const MatrixXd& of_amplitudes,
+                       MatrixXd& residual, MatrixXd& variance) {
   const MatrixXd design = observations.baseline_columns(rows);
-  for (auto& [group, members] : places_of_each(observations.group, rows)) {
-    std::erase_if(members, [&](Index r) { return !std::isnan(residual(r, 0)); });
-    std::vector<Index> fitted, scored;
-    for (std::size_t m = 0; m < members.size(); ++m) (m % 2 == 0 ? fitted : scored).push_back(members[m]);
+  for (const auto& [fitted, scored] : own_groups) {
     const MatrixXd of_fitted = covariance(fitted, fitted), shared = covariance(scored, fitted);
     const VectorXd weight = covariance.of_runs(fitted).cwiseInverse();
     const MatrixXd x = weight.asDiagonal() * design(fitted, Eigen::all), wanted = design(scored, Eigen::all);
@@ -159,7 +157,7 @@ struct Plain {
 
 StratumErrors errors_of_stratum(const Observations& observations, const MixedModel& model, std::size_t s,
                                 const Fit& fit, const NullFit& null, Plain plain,
-                                const std::vector<int>& rows) {
+                                const std::vector<int>& rows, const std::vector<OwnBaseline>& own_groups) {
   const MixedModel::Stratum& stratum = model.strata()[s];
   const Index n = static_cast<Index>(rows.size());
   const double sigma = null.sigma[s], ratio = kRatios[null.ratio[s]];
@@ -175,11 +173,11 @@ StratumErrors errors_of_stratum(const Observations& observations, const MixedMod
     variance += ((x * fit.covariance).array() * x.array()).rowwise().sum().matrix();
   }
   StratumErrors result{residual.reshaped(n, stratum.modes), variance.reshaped(n, stratum.modes), {}};
-  if (stratum.means() && (observations.groups_within_blocks || !observations.held_out.empty()))
-    own_baseline(observations, rows,
-                 RunCovariance(observations, rows, scatter, sigma, ratio, model.run_correlation(s)),
-                 plain.y.reshaped(n, stratum.modes), plain.columns, fit.covariance, result.error,
-                 result.variance);
+  if (stratum.means() && !own_groups.empty())
+    fit_own_baselines(observations, rows, own_groups,
+                      RunCovariance(observations, rows, scatter, sigma, ratio, model.run_correlation(s)),
+                      plain.y.reshaped(n, stratum.modes), plain.columns, fit.covariance, result.error,
+                      result.variance);
   result.whitened =
       whitened(observations, rows, result.error, scatter, sigma, ratio, model.run_correlation(s));
   return result;
@@ -221,13 +219,14 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
   const MixedModel test = MixedModel::baseline_alone(observations, test_rows);
   const std::vector<const Components*> items = pointers_to(columns);
   const Fit fit = fit_amplitudes(model, y, items, null);
+  const std::vector<OwnBaseline> own_groups = own_baselines(observations, fit_rows, test_rows);
   const Index n = static_cast<Index>(test_rows.size()), c = observations.channels();
   std::vector<VectorXd> parts;
   MatrixXd error_by_mode = MatrixXd::Zero(n, c), variance_by_mode = MatrixXd::Zero(n, c);
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
     const MixedModel::Stratum& stratum = model.strata()[s];
     StratumErrors own = errors_of_stratum(observations, model, s, fit, null,
-                                          {test.stack(s, {&y}), test.stack(s, items)}, test_rows);
+                                          {test.stack(s, {&y}), test.stack(s, items)}, test_rows, own_groups);
     parts.push_back(std::move(own.whitened));
     if (!stratum.means()) continue;
     error_by_mode.middleCols(stratum.first_mode, stratum.modes) = own.error;
@@ -236,6 +235,20 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
   HeldOutErrors result{test_rows, {}, {}, concatenated(parts), fit.amplitude};
   set_in_response_unit(observations, error_by_mode * model.rotors_of_modes(),
                        (variance_by_mode * model.rotors_of_modes().cwiseAbs2()).cwiseSqrt(), result);
+  return result;
+}
+
+std::vector<OwnBaseline> own_baselines(const Observations& observations, const std::vector<int>& fit_rows,
+                                       const std::vector<int>& test_rows) {
+  std::vector<OwnBaseline> result;
+  if (!observations.groups_within_blocks && observations.held_out.empty()) return result;
+  const auto seen = places_of_each(observations.group, fit_rows);
+  for (const auto& [group, members] : places_of_each(observations.group, test_rows)) {
+    if (seen.contains(group)) continue;
+    OwnBaseline& own = result.emplace_back();
+    for (std::size_t m = 0; m < members.size(); ++m)
+      (m % 2 == 0 ? own.fitted : own.scored).push_back(members[m]);
+  }
   return result;
 }
 

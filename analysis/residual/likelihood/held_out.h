@@ -46,6 +46,15 @@ struct Fold {
 };
 std::vector<Fold> leave_out_blocks(const Observations& observations, const std::vector<int>& rows);
 
+/// A group that lies in blocks that are held out whole: rows of it that give its own baseline, and the
+/// others, which are scored; places among the held-out rows.
+struct OwnBaseline {
+  std::vector<Eigen::Index> fitted, scored;
+};
+/// Those of `test_rows`; none where the baseline of a group that the fit has not seen is not known.
+std::vector<OwnBaseline> own_baselines(const Observations& observations, const std::vector<int>& fit_rows,
+                                       const std::vector<int>& test_rows);
+
 /// Leave-one-block-out over the blocks of `rows`.
 struct CrossValidation {
   std::vector<HeldOutErrors> folds;

@@ -159,6 +159,8 @@ StructureLeft structure_left(const Attribution& before, const JointFit& whole, c
     left.bent.merge(outshone(data, found));
     found.curves.back().could_be = names_on_all(state, found.curves.size() - 1, without, before);
   }
+  for (std::size_t t = 0; few && t < found.accepted.size(); ++t)
+    left.confounded.push_back(still_rivals_of(data, found, t));
   for (std::size_t c = 0; few && c < before.curves.size(); ++c)
     left.names.push_back(names_on_all(state, c, fit_without_curve(data, found.fit, c), before));
   smooth_curves(data, found, before.curves.size());

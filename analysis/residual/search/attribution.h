@@ -94,9 +94,10 @@ Attribution attribute(const Observations& observations, const std::vector<int>& 
 /// Structure without a name that more runs show beside what was found on some of them.
 struct StructureLeft {
   std::vector<FoundCurve> curves;
-  std::vector<std::vector<CouldBe>> names;  // of each curve that was found before, on all `rows`
-  JointFit fit;                             // to all `rows`: what was found, and then these curves
-  std::vector<Round> rounds;                // of the search
+  std::vector<std::vector<CouldBe>> names;      // of each curve that was found before, on all `rows`
+  std::vector<std::vector<Ranked>> confounded;  // of `accepted`, what all `rows` do not tell apart either
+  JointFit fit;                                 // to all `rows`: what was found, and then these curves
+  std::vector<Round> rounds;                    // of the search
   std::set<std::size_t> bent;  // of `accepted`: what its covariate does bends away from its formula
 };
 /// `found` speaks of its own observations, which must outlive the call. `whole`: its model fitted to `rows`,

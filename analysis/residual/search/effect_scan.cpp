@@ -41,7 +41,6 @@ Scan list_effects(const SearchData& data, const Found& found, const JointFit& ba
 
 /// Only effects that may have either sign: of the others, what all groups have in common is seen first.
 void add_group_ways(const SearchData& data, Scan& scan) {
-  constexpr std::size_t kMostGroups = 24;
   const std::vector<int> groups = groups_among(data.observations(), data.rows());
   if (groups.size() < 2 || groups.size() > kMostGroups) return;
   const std::size_t alike = scan.ways.size();

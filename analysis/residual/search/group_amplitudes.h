@@ -59,6 +59,9 @@ Eigen::Index place_among_own(const MeanModel& model, std::size_t t);
 /// The data without the column of term t.
 Observations without_own(const Observations& observations, const MeanModel& model, std::size_t t);
 
+/// Of more groups than this none is asked for what it has of its own.
+inline constexpr std::size_t kMostGroups = 24;
+
 /// The numbers of the groups that `rows` are of.
 std::vector<int> groups_among(const Observations& observations, const std::vector<int>& rows);
 

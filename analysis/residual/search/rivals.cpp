@@ -24,28 +24,68 @@ bool within_bounds(const Term& way, const CandidateFit& fit) {
   return fit.amplitude(0) >= amplitude.lower && fit.amplitude(0) <= amplitude.upper;
 }
 
-std::vector<Ranked> rivals(const SearchData& data, const Found& found, const Accepted& accepted,
-                           const JointFit& without, const Scan& scan) {
-  std::vector<Ranked> result;
-  const Components y = difference(data.y(), without.linear.offset);
-  const Eigen::MatrixXd predicted = predict_response(data.observations(), without.model, data.rows());
-  const auto validate = [&](const Term& way, const Candidate& candidate) {
-    std::vector<Components> columns = without.linear.columns;
+/// Leave-one-block-out on top of a fit, with the variances of what was found.
+class Validation {
+ public:
+  Validation(const SearchData& data, const NullFit& variances, const JointFit& without)
+      : data_(data),
+        variances_(variances),
+        columns_(without.linear.columns),
+        y_(difference(data.y(), without.linear.offset)),
+        predicted_(predict_response(data.observations(), without.model, data.rows())) {}
+
+  CrossValidation operator()(const Term& way, const Candidate& candidate) const {
+    std::vector<Components> columns = columns_;
     if (way.effect->theory_only) {  // with another amplitude it would be another effect
       Term at_theory = way;
       at_theory.parameters[0] = *way.effect->theory();
-      return cross_validate(data.observations(),
-                            difference(y, respond(at_theory, data.observations(), predicted).value), columns,
-                            found.fit.variances, data.rows());
+      return cross_validate(data_.observations(),
+                            difference(y_, respond(at_theory, data_.observations(), predicted_).value),
+                            columns, variances_, data_.rows());
     }
     columns.push_back(candidate.columns[0]);
-    return cross_validate(data.observations(), y, columns, found.fit.variances, data.rows());
-  };
-  std::optional<CrossValidation> own;
-  for (const std::size_t i : scan.order)
-    if (!own && scan.ways[i].effect->cause() == accepted.term.effect->cause() &&
-        scan.ways[i].rotor == accepted.term.rotor)
-      own = validate(scan.ways[i], scan.candidates[i]);
+    return cross_validate(data_.observations(), y_, columns, variances_, data_.rows());
+  }
+
+  /// Of the best way of an effect's cause on its rotor; none where it is not in the scan.
+  std::optional<CrossValidation> of_same(const Term& term, const Scan& scan) const {
+    for (const std::size_t i : scan.order)
+      if (scan.ways[i].effect->cause() == term.effect->cause() && scan.ways[i].rotor == term.rotor)
+        return (*this)(scan.ways[i], scan.candidates[i]);
+    return std::nullopt;
+  }
+
+ private:
+  const SearchData& data_;
+  const NullFit& variances_;
+  const std::vector<Components>& columns_;
+  Components y_;
+  Eigen::MatrixXd predicted_;
+};
+
+/// With a way of the scan in the place of an effect; nothing where that, or what the others must be beside
+/// it, is not physical.
+std::optional<Term> instead(const SearchData& data, const JointFit& without, const Scan& scan,
+                            std::size_t i) {
+  Term term = scan.ways[i];
+  if (!term.effect->theory_only && !within_bounds(term, scan.fits[i])) return std::nullopt;
+  term.parameters[0] = term.effect->theory_only ? *term.effect->theory() : scan.fits[i].amplitude(0);
+  MeanModel model = without.model;
+  model.terms.push_back(term);
+  model.terms.back().at_theory = term.effect->theory_only;
+  const JointFit fit = fit_jointly(data.observations(), model, data.rows());
+  const auto& terms = fit.model.terms;
+  if (std::any_of(terms.begin(), std::prev(terms.end()),
+                  [&](const Term& each) { return at_bound(fit, each); }))
+    return std::nullopt;
+  return terms.back();
+}
+
+std::vector<Ranked> rivals(const SearchData& data, const Found& found, const Accepted& accepted,
+                           const JointFit& without, const Scan& scan) {
+  std::vector<Ranked> result;
+  const Validation validate(data, found.fit.variances, without);
+  const std::optional<CrossValidation> own = validate.of_same(accepted.term, scan);
   if (!own) return result;
   std::vector<std::string> done = {accepted.term.effect->cause()};
   for (const std::size_t i : scan.order) {
@@ -53,23 +93,12 @@ std::vector<Ranked> rivals(const SearchData& data, const Found& found, const Acc
     const std::string cause = scan.ways[i].effect->cause();
     if (std::count(done.begin(), done.end(), cause) >= 3) continue;  // three ways of each are tried
     done.push_back(cause);
-    if (cause == accepted.term.effect->cause()) continue;
-    const bool listed = std::any_of(result.begin(), result.end(),
-                                    [&](const Ranked& r) { return r.term.effect->cause() == cause; });
-    if (listed || (!scan.ways[i].effect->theory_only && !within_bounds(scan.ways[i], scan.fits[i]))) continue;
-    if (compare(validate(scan.ways[i], scan.candidates[i]), *own).told_apart()) continue;
-    Term term = scan.ways[i];
-    term.parameters[0] = term.effect->theory_only ? *term.effect->theory() : scan.fits[i].amplitude(0);
-    // What the others must be beside it is physical as well.
-    MeanModel instead = without.model;
-    instead.terms.push_back(term);
-    instead.terms.back().at_theory = term.effect->theory_only;
-    const JointFit fit = fit_jointly(data.observations(), instead, data.rows());
-    const auto& terms = fit.model.terms;
-    if (std::any_of(terms.begin(), std::prev(terms.end()),
-                    [&](const Term& each) { return at_bound(fit, each); }))
+    if (cause == accepted.term.effect->cause() ||
+        std::ranges::any_of(result, [&](const Ranked& r) { return r.term.effect->cause() == cause; }))
       continue;
-    result.push_back({terms.back(), scan.fits[i].evidence, 0, terms.back().parameters[0], 0});
+    if (compare(validate(scan.ways[i], scan.candidates[i]), *own).told_apart()) continue;
+    if (const auto term = instead(data, without, scan, i))
+      result.push_back({*term, scan.fits[i].evidence, 0, term->parameters[0], 0});
   }
   return result;
 }
@@ -115,6 +144,29 @@ std::vector<Ranked> rivals_of(const SearchData& data, const Found& found, std::s
   if (found.accepted[t].term.per_group) return rivals_in_groups(data, found, found.accepted[t]);
   const JointFit without = fit_without(data, found.fit, t);
   return rivals(data, found, found.accepted[t], without, scan_effects(data, found, without));
+}
+
+std::vector<Ranked> still_rivals_of(const SearchData& data, const Found& found, std::size_t t) {
+  const Accepted& accepted = found.accepted[t];
+  if (accepted.confounded.empty() || accepted.term.per_group) return accepted.confounded;
+  const JointFit without = fit_without(data, found.fit, t);
+  const Scan scan = scan_effects(data, found, without);
+  const Validation validate(data, found.fit.variances, without);
+  const std::optional<CrossValidation> own = validate.of_same(accepted.term, scan);
+  if (!own) return accepted.confounded;
+  const auto is_told_apart = [&](const Ranked& rival) {
+    constexpr int kMostWays = 3;
+    int tried = 0;
+    for (const std::size_t i : scan.order) {
+      if (scan.ways[i].effect->cause() != rival.term.effect->cause()) continue;
+      if (!compare(validate(scan.ways[i], scan.candidates[i]), *own).told_apart()) return false;
+      if (++tried == kMostWays) break;
+    }
+    return tried > 0;
+  };
+  std::vector<Ranked> left = accepted.confounded;
+  std::erase_if(left, is_told_apart);
+  return left;
 }
 
 std::vector<Term> names_of_curve(const SearchData& data, const Found& found, std::size_t c,

@@ -13,6 +13,9 @@ namespace tunnelrig {
 /// about as well.
 std::vector<Ranked> rivals_of(const SearchData& data, const Found& found, std::size_t t);
 
+/// Those of effect t's `confounded` that these data do not tell from it either.
+std::vector<Ranked> still_rivals_of(const SearchData& data, const Found& found, std::size_t t);
+
 /// Effects that step 3 would accept in the place of curve c, and that predict unseen blocks about as well.
 /// `without`: the fit without the curve.
 std::vector<Term> names_of_curve(const SearchData& data, const Found& found, std::size_t c,

@@ -5,7 +5,9 @@
 #include "analysis/residual/scatter/rotor_scatter.h"
 #include "analysis/residual/scatter/rotor_sessions.h"
 #include "analysis/residual/scatter/run_correlation.h"
+#include "analysis/residual/search/curve_scan.h"
 #include "analysis/residual/search/draws.h"
+#include "analysis/residual/search/group_amplitudes.h"
 #include "analysis/residual/search/unseen.h"
 
 #include <algorithm>
@@ -29,8 +31,60 @@ struct ScatterBeside {
   ScatterFit scatter;
 };
 
+/// The best curves one after the other, a scan for each; the first is that of `curves`.
+std::vector<std::vector<Components>> columns_of_best(const SearchData& data, const Found& found,
+                                                     const CurveScan& curves) {
+  constexpr std::size_t kMost = 3;
+  std::vector<std::vector<Components>> result;
+  Found with = found;
+  CurveScan next;
+  for (const CurveScan* scan = &curves; !scan->tried.empty(); scan = &next) {
+    const Curve best = scan->tried[scan->scan.order[0]];
+    result.push_back(columns_with(with.fit, best.columns));
+    if (result.size() == kMost) break;
+    MeanModel model = with.fit.model;
+    model.curves.push_back(best);
+    with.add_curve({.curve = best, .instead_of = {}}, fit_jointly(data.observations(), model, data.rows()));
+    next = scan_curves(data, with);
+  }
+  return result;
+}
+
+/// Of all curves the one that does the most where its own columns stand beside the same times the scatter, or
+/// beside each group's own straight line: what a condition does where another one, with which the scatter
+/// goes, lets it, or in a group. None: empty.
+std::vector<Components> columns_that_go_with(const Eigen::VectorXd& scatter, const SearchData& data,
+                                             const Found& found, const CurveScan& curves) {
+  std::vector<Candidate> candidates;
+  for (const Curve& curve : curves.tried) {
+    if (curve.rotor >= 0 || !curve.everywhere()) continue;
+    Candidate& both = candidates.emplace_back(as_candidate(curve));
+    for (Components times : curve.columns) {
+      for (Eigen::MatrixXd& component : times) component = scatter.asDiagonal() * component;
+      both.columns.push_back(std::move(times));
+    }
+  }
+  const std::vector<int> groups = groups_among(data.observations(), data.rows());
+  for (const Curve& curve : curves.tried)
+    if (curve.rotor < 0 && curve.everywhere() && groups.size() > 1 && groups.size() <= kMostGroups)
+      candidates.push_back(
+          {.columns = columns_by_group(curve.columns[0], data.observations(), groups, data.mixed()),
+           .sign = 0});
+  if (candidates.empty()) return {};
+  const auto fits = CandidateScan(data.mixed(), found.fit.linear.columns, candidates)
+                        .fit(difference(data.y(), found.fit.linear.offset));
+  const double of_column = std::log(static_cast<double>(data.rows().size())) / 2;
+  std::size_t best = 0;
+  const auto worth = [&](std::size_t i) {
+    return fits[i].likelihood_ratio - of_column * static_cast<double>(candidates[i].columns.size());
+  };
+  for (std::size_t i = 1; i < fits.size(); ++i)
+    if (worth(i) > worth(best)) best = i;
+  return columns_with(found.fit, candidates[best].columns);
+}
+
 /// Beside the model and the best curve, if that has this evidence; or without the curve, where scatter is
-/// likelier.
+/// likelier than that, and than what several curves do together.
 ScatterBeside scatter_beside(const SearchData& data, const Found& found, const CurveScan& curves,
                              double least_evidence, std::mt19937_64& random) {
   const Components y = difference(data.y(), found.fit.linear.offset);
@@ -49,8 +103,21 @@ ScatterBeside scatter_beside(const SearchData& data, const Found& found, const C
   if (curves.tried.empty() || curves.scan.fits[curves.scan.order[0]].evidence < least_evidence) return alone;
   ScatterBeside with = beside(columns_with(found.fit, curves.tried[curves.scan.order[0]].columns));
   // A curve may be the scatter of a few runs far out on a condition, and scatter a curve.
-  const bool is_scatter = !alone.scatter.by_condition.names.empty() && likelihood(alone) > likelihood(with);
-  return is_scatter ? alone : with;
+  if (alone.scatter.by_condition.names.empty() || likelihood(alone) <= likelihood(with)) return with;
+  // What acts in a part of the runs only is a scatter to any single curve.
+  const double of_choice = std::log(static_cast<double>(curves.tried.size()));
+  const auto several = columns_of_best(data, found, curves);
+  for (std::size_t k = 1; k < several.size(); ++k) {
+    ScatterBeside more = beside(several[k]);
+    if (likelihood(more) - static_cast<double>(k) * of_choice > likelihood(alone)) return more;
+  }
+  const auto where_it_scatters = columns_that_go_with(alone.scatter.by_condition.runs, data, found, curves);
+  if (where_it_scatters.empty()) return alone;
+  ScatterBeside more = beside(where_it_scatters);
+  if (likelihood(more) - of_choice <= likelihood(alone)) return alone;
+  // What is left of a shape that these columns only resemble is no scatter to weigh by: that would hide it.
+  more.scatter = {.by_condition = {}, .variances = CandidateScan(data.mixed(), more.columns, {}).null_fit(y)};
+  return more;
 }
 
 /// Of single rotors over one condition, those that explain the most together; none where chance does as much.
