@@ -59,6 +59,8 @@ class Evaluation {
     if (observations.from_table) diameter_ = observations.find(kDiameter);
   }
 
+  void set_amplitude(double amplitude) { parameters_[0].a = amplitude; }
+
   bool applies(Index row, Index channel) const {
     if (term_.rotor >= 0 && channel != term_.rotor) return false;
     if (term_.effect->tunnel_only && !observations_.in_tunnel[static_cast<std::size_t>(row)]) return false;
@@ -171,15 +173,23 @@ bool Term::same_way(const Term& term) const {
 }
 
 TermResponse respond(const Term& term, const Observations& observations, const MatrixXd& predicted) {
+  return respond(term, Eigen::VectorXd::Constant(observations.rows(), term.parameters[0]), observations,
+                 predicted);
+}
+
+TermResponse respond(const Term& term, const Eigen::VectorXd& amplitude, const Observations& observations,
+                     const MatrixXd& predicted) {
   const MatrixXd zero = MatrixXd::Zero(observations.rows(), observations.channels());
   const Components none(1 + observations.shape.size(), zero);
   TermResponse response{none, {}};
   for (const EffectParameter& parameter : term.effect->parameters)
     response.derivative.push_back(parameter.role == ParameterRole::kChangePoint ? Components() : none);
   Evaluation evaluation(term, observations, predicted);
-  for (Index row = 0; row < observations.rows(); ++row)
+  for (Index row = 0; row < observations.rows(); ++row) {
+    evaluation.set_amplitude(amplitude(row));
     for (Index channel = 0; channel < observations.channels(); ++channel)
       if (evaluation.applies(row, channel)) evaluation.evaluate(row, channel, response);
+  }
   return response;
 }
 
