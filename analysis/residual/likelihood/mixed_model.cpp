@@ -157,7 +157,13 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
   const bool alike = observations.channels() == 1 || run_correlation_[0] == run_correlation_[1];
   std::set<std::size_t> wanted(ratio.begin(), ratio.end());
   for (std::size_t r = 0; r < ratios_ && ratio.empty(); ++r) wanted.insert(r);
-  for (std::size_t s = 0; s < (alike ? 1U : 2U); ++s) prepared_[s] = prepare(run_correlation_[s], wanted);
+  for (std::size_t side = 0; side < (alike ? 1U : 2U); ++side) {
+    const NormalParts parts = normal_parts(run_correlation_[side]);
+    prepared_[side] = prepare(parts, run_correlation_[side], wanted);
+    with_blocks_[side].resize(columns_, std::ssize(blocks_));
+    with_blocks_[side].setFromTriplets(parts.of_blocks.begin(), parts.of_blocks.end());
+    block_squares_[side] = parts.blocks;
+  }
   log_determinant_.assign(strata_.size(), std::vector<double>(ratios_));
   for (std::size_t s = 0; s < strata_.size(); ++s)
     for (const std::size_t r : wanted) log_determinant_[s][r] = make_log_determinant(s, r);
@@ -174,7 +180,7 @@ double MixedModel::run_correlation(std::size_t stratum) const {
 }
 
 const MixedModel::Prepared& MixedModel::prepared(std::size_t stratum, std::size_t ratio) const {
-  return prepared_[prepared_[1].empty() ? 0 : strata_[stratum].side()][ratio];
+  return prepared_[prepared_side(stratum)][ratio];
 }
 
 void MixedModel::set_groups() {
@@ -239,15 +245,13 @@ NormalParts MixedModel::normal_parts(double run_correlation) const {
   return parts;
 }
 
-std::vector<MixedModel::Prepared> MixedModel::prepare(double run_correlation,
+std::vector<MixedModel::Prepared> MixedModel::prepare(const NormalParts& parts, double run_correlation,
                                                       const std::set<std::size_t>& ratio) const {
   std::vector<Prepared> result(ratios_);
-  std::optional<NormalParts> parts;
   for (const std::size_t r : ratio) {
     result[r].log_xvx = log_of_groups_;
     if (kRatios[r] == 0 && run_correlation == 0 && (scatter_.array() == 1).all()) continue;
-    if (!parts) parts = normal_parts(run_correlation);
-    result[r].normal.emplace(*parts, kRatios[r]);
+    result[r].normal.emplace(parts, kRatios[r]);
     result[r].log_xvx += result[r].normal->log_determinant();
   }
   return result;
