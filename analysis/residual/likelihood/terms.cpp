@@ -4,7 +4,6 @@
 #include "analysis/upper_median.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -16,10 +15,12 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+using Cosines = Eigen::Matrix<double, kShapes + 1, kTimesWithinRun>;
+
 /// cos(π j (t + ½)/kTimesWithinRun), j = 0 … kShapes, scaled to give mean and cosine coefficients.
-const MatrixXd& cosines() {
-  static const MatrixXd table = [] {
-    MatrixXd result(kShapes + 1, kTimesWithinRun);
+const Cosines& cosines() {
+  static const Cosines table = [] {
+    Cosines result;
     for (int j = 0; j <= kShapes; ++j)
       for (int t = 0; t < kTimesWithinRun; ++t)
         result(j, t) = (j == 0 ? 1.0 : 2.0) / kTimesWithinRun *
@@ -77,17 +78,27 @@ class Evaluation {
       put(row, channel, 0, change(changed(sample, force), force, row, channel), response);
       return;
     }
-    std::array<EffectJet, kShapes + 1> coefficient{};
-    const std::size_t components = within_ ? response.value.size() : 1;
+    // Columns: the mean and the course's cosines; as one product of two, which the processor adds up side by
+    // side.
+    Eigen::Matrix<double, 1 + kMaxEffectParameters, kShapes + 1> coefficient;
+    coefficient.setZero();
     for (int t = 0; t < kTimesWithinRun; ++t) {
       sample.time_s = duration * (t + 0.5) / kTimesWithinRun;
-      const EffectJet then = changed(sample, force);
-      for (std::size_t j = 0; j < components; ++j)
-        coefficient[j] += cosines()(static_cast<Index>(j), t) * then;
+      const EffectJet jet = changed(sample, force);
+      Eigen::Vector<double, 1 + kMaxEffectParameters> then;
+      then << jet.a, jet.v;
+      if (within_)
+        coefficient += then * cosines().col(t).transpose();
+      else
+        coefficient.col(0) += cosines()(0, t) * then;
     }
-    put(row, channel, 0, change(coefficient[0], force, row, channel), response);
-    for (std::size_t j = 1; j < components; ++j)
-      put(row, channel, j, over_mean(coefficient[j], coefficient[0], force, row, channel), response);
+    const auto jet_of = [&](std::size_t j) {
+      const auto column = coefficient.col(static_cast<Index>(j));
+      return EffectJet(column(0), column.tail<kMaxEffectParameters>());
+    };
+    put(row, channel, 0, change(jet_of(0), force, row, channel), response);
+    for (std::size_t j = 1; j < response.value.size() && within_; ++j)
+      put(row, channel, j, over_mean(jet_of(j), jet_of(0), force, row, channel), response);
   }
 
  private:
