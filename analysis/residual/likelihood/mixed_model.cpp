@@ -185,7 +185,11 @@ const MixedModel::Prepared& MixedModel::prepared(std::size_t stratum, std::size_
 
 void MixedModel::set_groups() {
   const Index each = 1 + observations_.slopes.cols();
-  for (const auto& [number, rows] : rows_of_each(observations_.group, rows_)) {
+  first_column_.resize(rows_.size());
+  own_ = MatrixXd::Zero(static_cast<Index>(rows_.size()), each);
+  for (const auto& [number, places] : places_of_each(observations_.group, rows_)) {
+    std::vector<int> rows;
+    for (const Index place : places) rows.push_back(rows_[static_cast<std::size_t>(place)]);
     const Eigen::ColPivHouseholderQR<MatrixXd> qr(observations_.baseline_columns(rows));
     const Index rank = qr.rank();
     const MatrixXd r = qr.matrixQR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
@@ -195,15 +199,14 @@ void MixedModel::set_groups() {
     group.to_orthonormal.leftCols(rank) =
         MatrixXd(qr.colsPermutation()).leftCols(rank) *
         r.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(rank, rank));
+    // Not by to_orthonormal: of a slope that is nearly constant its product is not orthonormal, and a
+    // projection by it none.
+    const MatrixXd orthonormal = qr.householderQ() * MatrixXd::Identity(std::ssize(rows), rank);
+    own_(places, Eigen::seqN(0, rank)) = orthonormal;
+    for (const Index place : places) first_column_[static_cast<std::size_t>(place)] = columns_;
     log_of_groups_ += 2 * r.diagonal().array().abs().log().sum();
     columns_ += each;
     baseline_columns_ += rank;
-  }
-  own_.resize(static_cast<Index>(rows_.size()), each);
-  for (std::size_t k = 0; k < rows_.size(); ++k) {
-    const GroupBaseline& group = groups_.at(observations_.group[static_cast<std::size_t>(rows_[k])]);
-    first_column_.push_back(group.first);
-    own_.row(static_cast<Index>(k)) = baseline_row(group, rows_[k]);
   }
 }
 

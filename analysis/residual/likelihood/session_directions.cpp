@@ -13,6 +13,7 @@ SessionDirections::SessionDirections(const MixedModel& model, std::size_t stratu
       modes_(model.strata()[stratum].modes),
       // Of a run's course, which has no baseline, the products are a diagonal as they are.
       few_(model.strata()[stratum].means() && std::ssize(model.blocks()) <= most_blocks) {
+  constexpr double kNothing = 1e-12;  // of a block's squares
   if (model.ratios() == 1) return;
   count_ = std::ssize(model.blocks());
   MatrixXd ones = MatrixXd::Ones(std::ssize(model.rows()), 1);
@@ -21,15 +22,18 @@ SessionDirections::SessionDirections(const MixedModel& model, std::size_t stratu
   if (!few_) return;
   const MatrixXd products = model.block_products(stratum);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver((products + products.transpose()) / 2);
-  lambda_ = solver.eigenvalues().cwiseMax(0);
-  directions_ = solver.eigenvectors();
+  // increasing, the least those of sessions that the baseline absorbs: rounding, which may be below 0
+  const Eigen::VectorXd& lambda = solver.eigenvalues();
+  count_ = (lambda.array() > kNothing * model.block_squares(stratum).maxCoeff()).count();
+  lambda_ = lambda.tail(count_);
+  directions_ = solver.eigenvectors().rightCols(count_);
 }
 
 MatrixXd SessionDirections::in_blocks(const Eigen::Ref<const MatrixXd>& columns) const {
   const std::vector<std::vector<Index>>& blocks = model_->blocks();
-  MatrixXd result(count_, columns.cols());
+  MatrixXd result(std::ssize(blocks), columns.cols());
   for (Index c = 0; c < columns.cols(); ++c)
-    for (Index b = 0; b < count_; ++b) {
+    for (Index b = 0; b < result.rows(); ++b) {
       double sum = 0;
       for (const Index run : blocks[static_cast<std::size_t>(b)]) sum += of_blocks_(run) * columns(run, c);
       result(b, c) = sum;
