@@ -38,12 +38,19 @@ BaselineNormal::BaselineNormal(BaselineNormal&&) noexcept = default;
 BaselineNormal& BaselineNormal::operator=(BaselineNormal&&) noexcept = default;
 BaselineNormal::~BaselineNormal() = default;
 
-MatrixXd BaselineNormal::solve(const Eigen::Ref<const MatrixXd>& right) const {
+/// Of the inverse, the block of the rows and columns from `first` on that `right` has.
+MatrixXd BaselineNormal::solve_rows(Index first, const Eigen::Ref<const MatrixXd>& right) const {
   if (factor_->cholesky.info() != Eigen::Success)  // of what is no number
     return MatrixXd::Constant(right.rows(), right.cols(), std::numeric_limits<double>::quiet_NaN());
   MatrixXd whole = MatrixXd::Zero(factor_->cholesky.rows(), right.cols());
-  whole.topRows(columns_) = right;
-  return MatrixXd(factor_->cholesky.solve(whole)).topRows(columns_);
+  whole.middleRows(first, right.rows()) = right;
+  return MatrixXd(factor_->cholesky.solve(whole)).middleRows(first, right.rows());
+}
+
+MatrixXd BaselineNormal::solve(const Eigen::Ref<const MatrixXd>& right) const { return solve_rows(0, right); }
+
+MatrixXd BaselineNormal::solve_blocks(const Eigen::Ref<const MatrixXd>& right) const {
+  return solve_rows(columns_, right);
 }
 
 MatrixXd BaselineNormal::inverse_columns(Index first, Index count) const {

@@ -36,10 +36,14 @@ class BaselineNormal {
   Eigen::MatrixXd solve(const Eigen::Ref<const Eigen::MatrixXd>& right) const;
   /// Columns `first` … `first + count − 1` of the inverse.
   Eigen::MatrixXd inverse_columns(Eigen::Index first, Eigen::Index count) const;
+  /// (1 + a ZᵀPZ)⁻¹ times right-hand sides, one row for each block; P = R⁻¹ − R⁻¹L(LᵀR⁻¹L)⁻¹LᵀR⁻¹.
+  Eigen::MatrixXd solve_blocks(const Eigen::Ref<const Eigen::MatrixXd>& right) const;
   /// log|LᵀV⁻¹L|
   double log_determinant() const { return log_determinant_; }
 
  private:
+  Eigen::MatrixXd solve_rows(Eigen::Index first, const Eigen::Ref<const Eigen::MatrixXd>& right) const;
+
   struct Factor;
   std::unique_ptr<Factor> factor_;
   Eigen::Index columns_;

@@ -94,29 +94,40 @@ class Residuals : public ceres::CostFunction {
   }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    MeanModel model = model_;
-    for (std::size_t i = 0; i < free_.size(); ++i)
-      model.terms[free_[i].term].parameters[free_[i].parameter] = parameters[0][i];
-    const LinearModel linear = linearise(observations_, {model.terms, {}}, forces_, Shapes::kAll);
-    std::vector<const Components*> items = pointers_to(linear.columns);
-    items.insert(items.begin(), &linear.offset);
-    const MatrixXd whitened = whitener_(items);
-    Eigen::Map<VectorXd>(residuals, y_.size()) = y_ - whitened.col(0);
+    const VectorXd at = Eigen::Map<const VectorXd>(parameters[0], std::ssize(free_));
+    if (whitened_.size() == 0 || at != at_) {
+      whitened_ = whitened_at(at);
+      at_ = at;
+    }
+    Eigen::Map<VectorXd>(residuals, y_.size()) = y_ - whitened_.col(0);
     if (jacobians != nullptr && jacobians[0] != nullptr) {
       Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-          jacobians[0], y_.size(), static_cast<Index>(free_.size())) =
-          -whitened.rightCols(static_cast<Index>(free_.size()));
+          jacobians[0], y_.size(), std::ssize(free_)) = -whitened_.rightCols(std::ssize(free_));
     }
     return Eigen::Map<VectorXd>(residuals, y_.size()).allFinite();
   }
 
  private:
+  /// What the terms add, and its derivatives.
+  MatrixXd whitened_at(const VectorXd& parameters) const {
+    MeanModel model = model_;
+    for (std::size_t i = 0; i < free_.size(); ++i)
+      model.terms[free_[i].term].parameters[free_[i].parameter] = parameters(static_cast<Index>(i));
+    const LinearModel linear = linearise(observations_, {model.terms, {}}, forces_, Shapes::kAll);
+    std::vector<const Components*> items = pointers_to(linear.columns);
+    items.insert(items.begin(), &linear.offset);
+    return whitener_(items);
+  }
+
   const Observations& observations_;
   MeanModel model_;
   std::vector<FreeParameter> free_;
   const Whitener& whitener_;
   const Forces& forces_;
   VectorXd y_;
+  /// The last ones: the solver asks for the cost of a step, and for its derivatives where it takes it.
+  mutable VectorXd at_;
+  mutable MatrixXd whitened_;
 };
 
 bool solve(const Observations& observations, MeanModel& model, const Whitener& whitener,

@@ -157,7 +157,13 @@ MixedModel::MixedModel(const Observations& observations, std::vector<int> rows,
   const bool alike = observations.channels() == 1 || run_correlation_[0] == run_correlation_[1];
   std::set<std::size_t> wanted(ratio.begin(), ratio.end());
   for (std::size_t r = 0; r < ratios_ && ratio.empty(); ++r) wanted.insert(r);
-  for (std::size_t s = 0; s < (alike ? 1U : 2U); ++s) prepared_[s] = prepare(run_correlation_[s], wanted);
+  for (std::size_t side = 0; side < (alike ? 1U : 2U); ++side) {
+    const NormalParts parts = normal_parts(run_correlation_[side]);
+    prepared_[side] = prepare(parts, run_correlation_[side], wanted);
+    with_blocks_[side].resize(columns_, std::ssize(blocks_));
+    with_blocks_[side].setFromTriplets(parts.of_blocks.begin(), parts.of_blocks.end());
+    block_squares_[side] = parts.blocks;
+  }
   log_determinant_.assign(strata_.size(), std::vector<double>(ratios_));
   for (std::size_t s = 0; s < strata_.size(); ++s)
     for (const std::size_t r : wanted) log_determinant_[s][r] = make_log_determinant(s, r);
@@ -174,12 +180,16 @@ double MixedModel::run_correlation(std::size_t stratum) const {
 }
 
 const MixedModel::Prepared& MixedModel::prepared(std::size_t stratum, std::size_t ratio) const {
-  return prepared_[prepared_[1].empty() ? 0 : strata_[stratum].side()][ratio];
+  return prepared_[prepared_side(stratum)][ratio];
 }
 
 void MixedModel::set_groups() {
   const Index each = 1 + observations_.slopes.cols();
-  for (const auto& [number, rows] : rows_of_each(observations_.group, rows_)) {
+  first_column_.resize(rows_.size());
+  own_ = MatrixXd::Zero(static_cast<Index>(rows_.size()), each);
+  for (const auto& [number, places] : places_of_each(observations_.group, rows_)) {
+    std::vector<int> rows;
+    for (const Index place : places) rows.push_back(rows_[static_cast<std::size_t>(place)]);
     const Eigen::ColPivHouseholderQR<MatrixXd> qr(observations_.baseline_columns(rows));
     const Index rank = qr.rank();
     const MatrixXd r = qr.matrixQR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
@@ -189,15 +199,14 @@ void MixedModel::set_groups() {
     group.to_orthonormal.leftCols(rank) =
         MatrixXd(qr.colsPermutation()).leftCols(rank) *
         r.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(rank, rank));
+    // Not by to_orthonormal: of a slope that is nearly constant its product is not orthonormal, and a
+    // projection by it none.
+    const MatrixXd orthonormal = qr.householderQ() * MatrixXd::Identity(std::ssize(rows), rank);
+    own_(places, Eigen::seqN(0, rank)) = orthonormal;
+    for (const Index place : places) first_column_[static_cast<std::size_t>(place)] = columns_;
     log_of_groups_ += 2 * r.diagonal().array().abs().log().sum();
     columns_ += each;
     baseline_columns_ += rank;
-  }
-  own_.resize(static_cast<Index>(rows_.size()), each);
-  for (std::size_t k = 0; k < rows_.size(); ++k) {
-    const GroupBaseline& group = groups_.at(observations_.group[static_cast<std::size_t>(rows_[k])]);
-    first_column_.push_back(group.first);
-    own_.row(static_cast<Index>(k)) = baseline_row(group, rows_[k]);
   }
 }
 
@@ -239,15 +248,13 @@ NormalParts MixedModel::normal_parts(double run_correlation) const {
   return parts;
 }
 
-std::vector<MixedModel::Prepared> MixedModel::prepare(double run_correlation,
+std::vector<MixedModel::Prepared> MixedModel::prepare(const NormalParts& parts, double run_correlation,
                                                       const std::set<std::size_t>& ratio) const {
   std::vector<Prepared> result(ratios_);
-  std::optional<NormalParts> parts;
   for (const std::size_t r : ratio) {
     result[r].log_xvx = log_of_groups_;
     if (kRatios[r] == 0 && run_correlation == 0 && (scatter_.array() == 1).all()) continue;
-    if (!parts) parts = normal_parts(run_correlation);
-    result[r].normal.emplace(*parts, kRatios[r]);
+    result[r].normal.emplace(parts, kRatios[r]);
     result[r].log_xvx += result[r].normal->log_determinant();
   }
   return result;

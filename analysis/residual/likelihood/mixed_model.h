@@ -86,6 +86,17 @@ class MixedModel {
   /// Whitens with the ratio and takes out what the baseline can absorb, in place.
   void project(std::size_t stratum, std::size_t ratio, Stacked& columns) const;
 
+  // With P the inverse covariance of independent sessions less what the baseline absorbs, Z the blocks'
+  // indicators: what session variance changes products by.
+  /// ZᵀV⁻¹Z at ratio 0, of which there is the diagonal alone.
+  Eigen::VectorXd block_squares(std::size_t stratum) const;
+  /// ZᵀPZ, blocks × blocks.
+  Eigen::MatrixXd block_products(std::size_t stratum) const;
+  /// (1 + a ZᵀPZ)⁻¹ times columns (a row for each block); a: the ratio. Sparse, however many blocks there
+  /// are.
+  Eigen::MatrixXd solve_blocks(std::size_t stratum, std::size_t ratio,
+                               const Eigen::Ref<const Eigen::MatrixXd>& columns) const;
+
   /// Whether more than rounding is left of a column without what the baseline can absorb.
   bool sees(const Components& column) const;
 
@@ -147,9 +158,13 @@ class MixedModel {
   /// With the root's A and w: LᵀD⁻¹AᵀAD⁻¹L, the blocks' LᵀD⁻¹Aᵀw, and wᵀw.
   NormalParts normal_parts(double run_correlation) const;
   /// At the ratios that are wanted.
-  std::vector<Prepared> prepare(double run_correlation, const std::set<std::size_t>& ratio) const;
+  std::vector<Prepared> prepare(const NormalParts& parts, double run_correlation,
+                                const std::set<std::size_t>& ratio) const;
   /// Of a stratum of runs' means: their baseline.
   const Prepared& prepared(std::size_t stratum, std::size_t ratio) const;
+  std::size_t prepared_side(std::size_t stratum) const {
+    return prepared_[1].empty() ? 0 : strata_[stratum].side();
+  }
   double make_log_determinant(std::size_t stratum, std::size_t ratio) const;
   /// A run's few values in the columns of its group.
   Eigen::RowVectorXd baseline_row(const GroupBaseline& group, int row) const;
@@ -173,6 +188,9 @@ class MixedModel {
   Eigen::VectorXd alike_, scatter_;  // 1, and d, of each run
   /// By ratio; of the rotors' differences only where their runs are correlated otherwise than the means.
   std::array<std::vector<Prepared>, 2> prepared_;
+  /// Likewise: LᵀR⁻¹Z and the diagonal ZᵀR⁻¹Z, R being V at ratio 0.
+  std::array<Eigen::SparseMatrix<double>, 2> with_blocks_;
+  std::array<Eigen::VectorXd, 2> block_squares_;
   std::vector<std::vector<double>> log_determinant_;  // stratum, ratio
 };
 

@@ -102,11 +102,10 @@ std::vector<ScanProducts::Products> ScanProducts::multiply(std::size_t stratum,
   const Stacked c = among_all(projected_[stratum]), in_sessions = among_all(by_session_[stratum]);
   std::vector<Products> result(model_.ratios());
   for (std::size_t ratio = 0; ratio < model_.ratios(); ++ratio) {
-    const Eigen::VectorXd weights = sessions_[stratum].weights(kRatios[ratio]);
+    const Stacked weighted = sessions_[stratum].weighted(ratio, in_sessions);
     const auto product = [&](Index first_a, Index a, Index first_b, Index b) -> MatrixXd {
       return c.middleCols(first_a, a).transpose() * c.middleCols(first_b, b) -
-             in_sessions.middleCols(first_a, a).transpose() * weights.asDiagonal() *
-                 in_sessions.middleCols(first_b, b);
+             in_sessions.middleCols(first_a, a).transpose() * weighted.middleCols(first_b, b);
     };
     result[ratio].adopted_adopted = product(0, adopted_, 0, adopted_);
     result[ratio].adopted_candidate = product(0, adopted_, 0, all_);
@@ -147,7 +146,7 @@ void ScanProducts::multiply(std::size_t stratum, Stacked sets, Index from,
   const Eigen::VectorXd squares = sets.colwise().squaredNorm();
   const MatrixXd columns = projected_[stratum].transpose() * sets;
   for (std::size_t ratio = 0; ratio < model_.ratios(); ++ratio) {
-    const Stacked weighted = sessions.weights(kRatios[ratio]).asDiagonal() * in_sessions;
+    const Stacked weighted = sessions.weighted(ratio, in_sessions);
     auto own = result[ratio].squares.segment(from, sets.cols());
     own = squares - weighted.cwiseProduct(in_sessions).colwise().sum().transpose();
     result[ratio].least.segment(from, sets.cols()) = kRounding * own;

@@ -1,7 +1,5 @@
 #include "analysis/residual/likelihood/session_directions.h"
 
-#include <algorithm>
-
 #include <Eigen/Eigenvalues>
 
 namespace tunnelrig {
@@ -9,56 +7,63 @@ namespace tunnelrig {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-SessionDirections::SessionDirections(const MixedModel& model, std::size_t stratum)
-    : modes_(model.strata()[stratum].modes), blocks_(model.blocks()) {
-  constexpr double kNothing = 1e-12;  // of the largest: sessions that the baseline absorbs
-  constexpr Index kAtATime = 64;      // indicators, which are dense once they are projected
-  if (model.ratios() == 1) {
-    blocks_.clear();
-    return;
-  }
-  MatrixXd ones = MatrixXd::Ones(static_cast<Index>(model.rows().size()), 1);
-  whiten(blocks_, model.run_scatter(stratum), 0, model.run_correlation(stratum), ones);
+SessionDirections::SessionDirections(const MixedModel& model, std::size_t stratum, Index most_blocks)
+    : model_(&model),
+      stratum_(stratum),
+      modes_(model.strata()[stratum].modes),
+      // Of a run's course, which has no baseline, the products are a diagonal as they are.
+      few_(model.strata()[stratum].means() && std::ssize(model.blocks()) <= most_blocks) {
+  constexpr double kNothing = 1e-12;  // of a block's squares
+  if (model.ratios() == 1) return;
+  count_ = std::ssize(model.blocks());
+  MatrixXd ones = MatrixXd::Ones(std::ssize(model.rows()), 1);
+  whiten(model.blocks(), model.run_scatter(stratum), 0, model.run_correlation(stratum), ones);
   of_blocks_ = ones;
-  const auto blocks = static_cast<Index>(blocks_.size());
-  MatrixXd products(blocks, blocks);
-  for (Index first = 0; first < blocks; first += kAtATime) {
-    const Index some = std::min(kAtATime, blocks - first);
-    Stacked indicators = Stacked::Zero(of_blocks_.size(), some);
-    for (Index b = 0; b < some; ++b) indicators(blocks_[static_cast<std::size_t>(first + b)], b).setOnes();
-    model.project(stratum, 0, indicators);
-    products.middleCols(first, some) = in_blocks(indicators);
-  }
+  if (!few_) return;
+  const MatrixXd products = model.block_products(stratum);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver((products + products.transpose()) / 2);
-  const Eigen::VectorXd& lambda = solver.eigenvalues();  // increasing
-  const Index kept = (lambda.array() > kNothing * lambda.maxCoeff()).count();
-  lambda_ = lambda.tail(kept);
-  directions_ = solver.eigenvectors().rightCols(kept) * lambda_.cwiseSqrt().cwiseInverse().asDiagonal();
+  // increasing, the least those of sessions that the baseline absorbs: rounding, which may be below 0
+  const Eigen::VectorXd& lambda = solver.eigenvalues();
+  count_ = (lambda.array() > kNothing * model.block_squares(stratum).maxCoeff()).count();
+  lambda_ = lambda.tail(count_);
+  directions_ = solver.eigenvectors().rightCols(count_);
 }
 
 MatrixXd SessionDirections::in_blocks(const Eigen::Ref<const MatrixXd>& columns) const {
-  MatrixXd result(static_cast<Index>(blocks_.size()), columns.cols());
+  const std::vector<std::vector<Index>>& blocks = model_->blocks();
+  MatrixXd result(std::ssize(blocks), columns.cols());
   for (Index c = 0; c < columns.cols(); ++c)
-    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    for (Index b = 0; b < result.rows(); ++b) {
       double sum = 0;
-      for (const Index run : blocks_[b]) sum += of_blocks_(run) * columns(run, c);
-      result(static_cast<Index>(b), c) = sum;
+      for (const Index run : blocks[static_cast<std::size_t>(b)]) sum += of_blocks_(run) * columns(run, c);
+      result(b, c) = sum;
     }
   return result;
 }
 
 Stacked SessionDirections::coordinates(const Stacked& projected) const {
-  Stacked result(directions_.cols() * modes_, projected.cols());
+  Stacked result(count_ * modes_, projected.cols());
   if (result.size() == 0) return result;
   const Eigen::Map<const MatrixXd> by_mode(projected.data(), of_blocks_.size(), modes_ * projected.cols());
-  Eigen::Map<MatrixXd>(result.data(), directions_.cols(), by_mode.cols()).noalias() =
-      directions_.transpose() * in_blocks(by_mode);
+  Eigen::Map<MatrixXd> by_block(result.data(), count_, by_mode.cols());
+  if (few_)
+    by_block.noalias() = directions_.transpose() * in_blocks(by_mode);
+  else
+    by_block = in_blocks(by_mode);
   return result;
 }
 
-Eigen::VectorXd SessionDirections::weights(double session_ratio) const {
-  const Eigen::ArrayXd scaled = session_ratio * lambda_.array();
-  return (scaled / (1 + scaled)).matrix().replicate(modes_, 1);
+Stacked SessionDirections::weighted(std::size_t ratio, const Stacked& coordinates) const {
+  if (coordinates.size() == 0) return coordinates;
+  const double a = kRatios[ratio];
+  const Eigen::Map<const MatrixXd> by_block(coordinates.data(), count_, coordinates.size() / count_);
+  Stacked result(coordinates.rows(), coordinates.cols());
+  Eigen::Map<MatrixXd> weighted(result.data(), by_block.rows(), by_block.cols());
+  if (few_)
+    weighted = (a / (1 + a * lambda_.array())).matrix().asDiagonal() * by_block;
+  else
+    weighted = a * model_->solve_blocks(stratum_, ratio, by_block);
+  return result;
 }
 
 }  // namespace tunnelrig

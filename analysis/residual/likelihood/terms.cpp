@@ -4,7 +4,6 @@
 #include "analysis/upper_median.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -16,10 +15,12 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+using Cosines = Eigen::Matrix<double, kShapes + 1, kTimesWithinRun>;
+
 /// cos(π j (t + ½)/kTimesWithinRun), j = 0 … kShapes, scaled to give mean and cosine coefficients.
-const MatrixXd& cosines() {
-  static const MatrixXd table = [] {
-    MatrixXd result(kShapes + 1, kTimesWithinRun);
+const Cosines& cosines() {
+  static const Cosines table = [] {
+    Cosines result;
     for (int j = 0; j <= kShapes; ++j)
       for (int t = 0; t < kTimesWithinRun; ++t)
         result(j, t) = (j == 0 ? 1.0 : 2.0) / kTimesWithinRun *
@@ -59,6 +60,8 @@ class Evaluation {
     if (observations.from_table) diameter_ = observations.find(kDiameter);
   }
 
+  void set_amplitude(double amplitude) { parameters_[0].a = amplitude; }
+
   bool applies(Index row, Index channel) const {
     if (term_.rotor >= 0 && channel != term_.rotor) return false;
     if (term_.effect->tunnel_only && !observations_.in_tunnel[static_cast<std::size_t>(row)]) return false;
@@ -75,17 +78,27 @@ class Evaluation {
       put(row, channel, 0, change(changed(sample, force), force, row, channel), response);
       return;
     }
-    std::array<EffectJet, kShapes + 1> coefficient{};
-    const std::size_t components = within_ ? response.value.size() : 1;
+    // Columns: the mean and the course's cosines; as one product of two, which the processor adds up side by
+    // side.
+    Eigen::Matrix<double, 1 + kMaxEffectParameters, kShapes + 1> coefficient;
+    coefficient.setZero();
     for (int t = 0; t < kTimesWithinRun; ++t) {
       sample.time_s = duration * (t + 0.5) / kTimesWithinRun;
-      const EffectJet then = changed(sample, force);
-      for (std::size_t j = 0; j < components; ++j)
-        coefficient[j] += cosines()(static_cast<Index>(j), t) * then;
+      const EffectJet jet = changed(sample, force);
+      Eigen::Vector<double, 1 + kMaxEffectParameters> then;
+      then << jet.a, jet.v;
+      if (within_)
+        coefficient += then * cosines().col(t).transpose();
+      else
+        coefficient.col(0) += cosines()(0, t) * then;
     }
-    put(row, channel, 0, change(coefficient[0], force, row, channel), response);
-    for (std::size_t j = 1; j < components; ++j)
-      put(row, channel, j, over_mean(coefficient[j], coefficient[0], force, row, channel), response);
+    const auto jet_of = [&](std::size_t j) {
+      const auto column = coefficient.col(static_cast<Index>(j));
+      return EffectJet(column(0), column.tail<kMaxEffectParameters>());
+    };
+    put(row, channel, 0, change(jet_of(0), force, row, channel), response);
+    for (std::size_t j = 1; j < response.value.size() && within_; ++j)
+      put(row, channel, j, over_mean(jet_of(j), jet_of(0), force, row, channel), response);
   }
 
  private:
@@ -171,15 +184,23 @@ bool Term::same_way(const Term& term) const {
 }
 
 TermResponse respond(const Term& term, const Observations& observations, const MatrixXd& predicted) {
+  return respond(term, Eigen::VectorXd::Constant(observations.rows(), term.parameters[0]), observations,
+                 predicted);
+}
+
+TermResponse respond(const Term& term, const Eigen::VectorXd& amplitude, const Observations& observations,
+                     const MatrixXd& predicted) {
   const MatrixXd zero = MatrixXd::Zero(observations.rows(), observations.channels());
   const Components none(1 + observations.shape.size(), zero);
   TermResponse response{none, {}};
   for (const EffectParameter& parameter : term.effect->parameters)
     response.derivative.push_back(parameter.role == ParameterRole::kChangePoint ? Components() : none);
   Evaluation evaluation(term, observations, predicted);
-  for (Index row = 0; row < observations.rows(); ++row)
+  for (Index row = 0; row < observations.rows(); ++row) {
+    evaluation.set_amplitude(amplitude(row));
     for (Index channel = 0; channel < observations.channels(); ++channel)
       if (evaluation.applies(row, channel)) evaluation.evaluate(row, channel, response);
+  }
   return response;
 }
 

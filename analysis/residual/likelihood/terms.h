@@ -47,6 +47,10 @@ struct TermResponse {
 /// the response's unit). Regressors come from predictions, never from measured responses.
 TermResponse respond(const Term& term, const Observations& observations, const Eigen::MatrixXd& predicted);
 
+/// The same, at an amplitude of each row's own.
+TermResponse respond(const Term& term, const Eigen::VectorXd& amplitude, const Observations& observations,
+                     const Eigen::MatrixXd& predicted);
+
 /// Typical values of an effect's covariates.
 std::vector<double> reference_of(const Effect& effect, const Observations& observations);
 

@@ -73,13 +73,13 @@ class Differences {
     const double dof = static_cast<double>(model_.dof(stratum_)) /
                        static_cast<double>(model_.strata()[stratum_].modes) *
                        static_cast<double>(direction.size());
-    const VectorXd own_in_sessions = (data.in_sessions * direction).cwiseAbs2();
-    const VectorXd all_in_sessions = data.in_sessions.rowwise().squaredNorm();
+    const MatrixXd own = data.in_sessions * direction;
     std::array<double, kRatios.size()> own_rss, others_rss, determinant;
     for (std::size_t r = 0; r < kRatios.size(); ++r) {
-      const VectorXd weights = sessions_.weights(kRatios[r]).head(own_in_sessions.size());
-      own_rss[r] = own_squares - weights.dot(own_in_sessions);
-      others_rss[r] = all_squares - own_squares - weights.dot(all_in_sessions - own_in_sessions);
+      const double own_of_sessions = own.cwiseProduct(sessions_.weighted(r, own)).sum(),
+                   of_sessions = data.in_sessions.cwiseProduct(sessions_.weighted(r, data.in_sessions)).sum();
+      own_rss[r] = own_squares - own_of_sessions;
+      others_rss[r] = all_squares - own_squares - (of_sessions - own_of_sessions);
       determinant[r] =
           model_.log_determinant(stratum_, r) / static_cast<double>(model_.strata()[stratum_].modes);
     }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string_view>
 
 namespace tunnelrig {
 
@@ -55,24 +57,20 @@ double likelihood_beside_own(const Observations& observations, const NullFit& fi
 }
 
 VectorXd values_by_group(const Observations& observations, const std::vector<GroupEstimate>& estimates) {
+  std::map<std::string_view, double> value;
+  for (const GroupEstimate& estimate : estimates) value[estimate.group] = estimate.value;
   VectorXd result = VectorXd::Zero(observations.groups());
-  for (const GroupEstimate& estimate : estimates)
-    for (int group = 0; group < observations.groups(); ++group)
-      if (observations.group_name[static_cast<std::size_t>(group)] == estimate.group)
-        result(group) = estimate.value;
+  for (int group = 0; group < observations.groups(); ++group)
+    if (const auto of = value.find(observations.group_name[static_cast<std::size_t>(group)]);
+        of != value.end())
+      result(group) = of->second;
   return result;
 }
 
-OwnResponse respond_in_groups(Term term, const VectorXd& amplitude, const Observations& observations,
+OwnResponse respond_in_groups(const Term& term, const VectorXd& amplitude, const Observations& observations,
                               const MatrixXd& forces) {
-  OwnResponse result{VectorXd::Zero(observations.rows()), VectorXd::Zero(observations.rows())};
-  for (const auto& [group, own] : places_of_each(observations.group)) {
-    term.parameters[0] = amplitude(group);
-    const TermResponse response = respond(term, observations, forces);
-    result.value(own) = response.value[0](own, 0);
-    result.derivative(own) = response.derivative[0][0](own, 0);
-  }
-  return result;
+  const TermResponse response = respond(term, VectorXd(amplitude(observations.group)), observations, forces);
+  return {response.value[0].col(0), response.derivative[0][0].col(0)};
 }
 
 GroupTerm group_term(const Observations& observations, const JointFit& fit, const Forces& forces,

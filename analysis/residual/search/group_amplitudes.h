@@ -42,8 +42,8 @@ struct OwnResponse {
     return value - amplitude.cwiseProduct(derivative);
   }
 };
-OwnResponse respond_in_groups(Term term, const Eigen::VectorXd& amplitude, const Observations& observations,
-                              const Eigen::MatrixXd& forces);
+OwnResponse respond_in_groups(const Term& term, const Eigen::VectorXd& amplitude,
+                              const Observations& observations, const Eigen::MatrixXd& forces);
 
 /// What such a term acts on, and with which amplitudes (of all rows, those of their groups, within bounds).
 struct GroupTerm {

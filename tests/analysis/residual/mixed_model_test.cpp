@@ -1,6 +1,7 @@
 // The random part of the model against dense algebra.
 #include "analysis/residual/likelihood/mixed_model.h"
 
+#include "analysis/residual/likelihood/session_directions.h"
 #include "analysis/residual/scatter/run_correlation.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
@@ -220,6 +221,29 @@ TEST(MixedModel, BlocksOfSingleRowsHaveOneRatio) {
   Observations observations = test::simulate({.runs_of_block = std::vector<int>(20, 1)}, random);
   observations.blocks_are_rows = true;
   EXPECT_EQ(MixedModel(observations, observations.all_rows()).ratios(), 1u);
+}
+
+/// By directions, as of few blocks, and by equations solved at each ratio, as of many.
+TEST_P(MixedModelTest, SessionVarianceChangesProductsAsAProjectionAtItDoes) {
+  observations.slopes = draw(observations.rows(), 1);
+  const MixedModel model(observations, rows);
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
+    const Stacked columns = draw(static_cast<Index>(rows.size()) * model.strata()[s].modes, 3);
+    Stacked at_0 = columns;
+    model.project(s, 0, at_0);
+    for (const Index most_blocks : {Index{0}, SessionDirections::kMostBlocks}) {
+      const SessionDirections sessions(model, s, most_blocks);
+      const Stacked coordinates = sessions.coordinates(at_0);
+      for (std::size_t ratio = 0; ratio < model.ratios(); ++ratio) {
+        Stacked projected = columns;
+        model.project(s, ratio, projected);
+        const MatrixXd products =
+            at_0.transpose() * at_0 - coordinates.transpose() * sessions.weighted(ratio, coordinates);
+        EXPECT_LT((products - projected.transpose() * projected).norm(), 1e-11 * products.norm())
+            << "stratum " << s << ", ratio " << kRatios[ratio] << ", directions of " << most_blocks;
+      }
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Rotors, MixedModelTest,

@@ -17,6 +17,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 /// Every condition that any effect asks for.
 void add_every_covariate(Observations& o, std::mt19937_64& random) {
@@ -101,6 +102,25 @@ TEST(Terms, DerivativesAreFiniteDifferencesOfTheValue) {
         const MatrixXd difference = (high.value[j] - low.value[j]) / (2 * step);
         EXPECT_LT((difference - response.derivative[k][j]).norm(),
                   1e-4 * response.derivative[k][j].norm() + 1e-12 / step);
+      }
+    }
+  }
+}
+
+TEST(Terms, AnAmplitudeOfEachRowsOwnIsThatOfTheTermThere) {
+  std::mt19937_64 random(test::seed());
+  Observations o = test::simulate({.shapes = kShapes}, random);
+  add_every_covariate(o, random);
+  const VectorXd amplitude = VectorXd::LinSpaced(o.rows(), -0.3, 0.4);
+  for (const std::string name : {"zero_drift_time", "creep", "hysteresis"}) {
+    Term term = ways_to_try(test::effect_named(name), o, o.all_rows())[0];
+    const TermResponse together = respond(term, amplitude, o, o.value);
+    for (Index row = 0; row < o.rows(); ++row) {
+      term.parameters[0] = amplitude(row);
+      const TermResponse alone = respond(term, o, o.value);
+      for (std::size_t j = 0; j < alone.value.size(); ++j) {
+        EXPECT_EQ(together.value[j](row, 0), alone.value[j](row, 0)) << name;
+        EXPECT_EQ(together.derivative[0][j](row, 0), alone.derivative[0][j](row, 0)) << name;
       }
     }
   }
