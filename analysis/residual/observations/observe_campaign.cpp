@@ -272,6 +272,11 @@ Observations observe(const CampaignData& data, const ObservationChoice& choice, 
   say_what_lacks_temperature(data, result);
   warn_of_names(data, result);
   result.newtons_per_volt = Eigen::VectorXd::Ones(data.info.rig.rotors);
+  if (!data.certificate && result.response == "thrust")
+    result.left_out.emplace_back(
+        "the cells are not calibrated: what a cell adds, and its bounds, count 1 N for 1 V (tunnelrig "
+        "calibrate, "
+        "where there are calibration data)");
   if (data.certificate)
     for (int c = 0; c < data.info.rig.rotors; ++c)
       result.newtons_per_volt(c) = 1 / (data.certificate->cells[static_cast<std::size_t>(c)].gain_V_per_N *

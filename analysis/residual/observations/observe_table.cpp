@@ -342,7 +342,8 @@ Observations observe_table(const ObservationTable& table, const ObservationChoic
     throw InputError(fmt::format("the response {} is the same in every row: there is nothing to explain",
                                  result.response));
   result.slopes.resize(source.count(), 0);
-  set_scale(source, scatters_alike(table.schema, choice), result);
+  const bool either_sign = result.value.minCoeff() < 0 && result.value.maxCoeff() > 0;
+  set_scale(source, scatters_alike(table.schema, choice, either_sign), result);
   add_covariates(source, result);
   set_previous(result);
   set_baseline(source, choice, result);

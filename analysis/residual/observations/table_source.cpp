@@ -47,9 +47,11 @@ bool is_own_response(const TableSchema& schema, const ObservationChoice& choice)
   return choice.response.empty() || choice.response == schema.response.column;
 }
 
-bool scatters_alike(const TableSchema& schema, const ObservationChoice& choice) {
-  if (!is_own_response(schema, choice) || choice.baseline.starts_with("power:")) return false;
+bool scatters_alike(const TableSchema& schema, const ObservationChoice& choice, bool either_sign) {
+  if (choice.baseline.starts_with("power:")) return false;
+  if (!is_own_response(schema, choice)) return either_sign;
   if (!schema.scatter.empty()) return schema.scatter == "absolute";
+  if (schema.response.meaning.empty() && either_sign) return true;
   return unit_from_name(schema.response.unit).quantity == "voltage";
 }
 
@@ -85,7 +87,7 @@ bool have_a_tare(const ObservationTable& table, const ObservationChoice& choice,
     with_speed += table.rows[r].speed_rpm.value_or(0) > 0 ? 1U : 0U;
   }
   return 2 * with_speed > rows.size() &&
-         (scatters_alike(table.schema, choice) || of_other_sign(thrust_N, group));
+         (scatters_alike(table.schema, choice, false) || of_other_sign(thrust_N, group));
 }
 
 /// Leaves out rows for which `is_out` holds, and says which.

@@ -32,8 +32,9 @@ TableColumn described(const TableSchema& schema, const std::string& name);
 /// Whether the choice is the response that the schema names.
 bool is_own_response(const TableSchema& schema, const ObservationChoice& choice);
 
-/// A cell's volts scatter alike under any load; what a rotor gives scatters with its size.
-bool scatters_alike(const TableSchema& schema, const ObservationChoice& choice);
+/// A cell's volts scatter alike under any load, and so does what is no rotor's and has groups of either sign
+/// (`either_sign`): nothing is there at its zero. What a rotor gives scatters with its size.
+bool scatters_alike(const TableSchema& schema, const ObservationChoice& choice, bool either_sign);
 
 /// The first of `values` that has not the sign of most of its group.
 std::optional<std::size_t> of_other_sign(const std::vector<double>& values,

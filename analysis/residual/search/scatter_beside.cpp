@@ -102,19 +102,25 @@ ScatterBeside scatter_beside(const SearchData& data, const Found& found, const C
   ScatterBeside alone = beside(found.fit.linear.columns);
   if (curves.tried.empty() || curves.scan.fits[curves.scan.order[0]].evidence < least_evidence) return alone;
   ScatterBeside with = beside(columns_with(found.fit, curves.tried[curves.scan.order[0]].columns));
+  if (alone.scatter.by_condition.names.empty()) return with;
   // A curve may be the scatter of a few runs far out on a condition, and scatter a curve.
-  if (alone.scatter.by_condition.names.empty() || likelihood(alone) <= likelihood(with)) return with;
+  ScatterBeside best = likelihood(alone) > likelihood(with) ? alone : std::move(with);
+  double most = likelihood(best);
   // What acts in a part of the runs only is a scatter to any single curve.
   const double of_choice = std::log(static_cast<double>(curves.tried.size()));
   const auto several = columns_of_best(data, found, curves);
-  for (std::size_t k = 1; k < several.size(); ++k) {
+  for (std::size_t k = 1; k < several.size() && !best.scatter.by_condition.names.empty(); ++k) {
     ScatterBeside more = beside(several[k]);
-    if (likelihood(more) - static_cast<double>(k) * of_choice > likelihood(alone)) return more;
+    const double of_more = likelihood(more) - static_cast<double>(k) * of_choice;
+    if (of_more <= most) continue;
+    best = std::move(more);
+    most = of_more;
   }
-  const auto where_it_scatters = columns_that_go_with(alone.scatter.by_condition.runs, data, found, curves);
-  if (where_it_scatters.empty()) return alone;
-  ScatterBeside more = beside(where_it_scatters);
-  if (likelihood(more) - of_choice <= likelihood(alone)) return alone;
+  if (best.scatter.by_condition.names.empty()) return best;
+  const auto in_a_part = columns_that_go_with(alone.scatter.by_condition.runs, data, found, curves);
+  if (in_a_part.empty()) return best;
+  ScatterBeside more = beside(in_a_part);
+  if (likelihood(more) - of_choice <= most) return best;
   // What is left of a shape that these columns only resemble is no scatter to weigh by: that would hide it.
   more.scatter = {.by_condition = {}, .variances = CandidateScan(data.mixed(), more.columns, {}).null_fit(y)};
   return more;

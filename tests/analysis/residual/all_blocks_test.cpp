@@ -106,6 +106,34 @@ TEST_F(AllBlocks, WhatTheOpenOnesShowMayHaveAName) {
   EXPECT_TRUE(otherwise[0].empty());
 }
 
+/// Two conditions that went together while the blocks were open, and do not in the sealed ones.
+TEST_F(AllBlocks, WhatTheyTellApartIsNoSet) {
+  Observations o = campaign(0.3);
+  test::add_covariate(o, "supply_voltage_V", 11, 12.5, random);
+  const Eigen::VectorXd volts = o.covariates.back().value.col(0);
+  test::add_covariate(o, "cell_temperature_C", 10, 30, random);
+  std::vector<int> open;
+  for (int row = 0; row < 96; ++row) {
+    o.covariates.back().value(row, 0) = 20 + 100 * std::log(volts(row) / 11.7);
+    open.push_back(row);
+  }
+  test::add_effect(o, "supply_voltage", {0.5});
+  const Attribution found = attribute(o, open, test::every_effect(), test::quick());
+  ASSERT_EQ(found.accepted.size(), 1u);
+  const std::vector<Ranked>& set = found.accepted[0].confounded;
+  ASSERT_FALSE(set.empty());
+  const std::vector<int> rows = o.all_rows();
+  const StructureLeft left = structure_left(found, fit_jointly(o, found.final.model, rows), rows,
+                                            test::every_effect(), test::quick());
+  ASSERT_EQ(left.confounded.size(), 1u);
+  if (found.accepted[0].term.effect->name == "supply_voltage")
+    EXPECT_TRUE(left.confounded[0].empty());
+  else
+    EXPECT_TRUE(std::ranges::any_of(left.confounded[0], [](const Ranked& rival) {
+      return rival.term.effect->name == "supply_voltage";
+    })) << "a rival that does better";
+}
+
 /// What a rotor does above a temperature and not below is half a line: few sessions do not show its other
 /// half, all of them do.
 TEST_F(AllBlocks, AFormulaThatItsOwnConditionBendsAwayFromIsTakenBack) {
