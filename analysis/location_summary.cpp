@@ -1,6 +1,8 @@
 #include "analysis/location_summary.h"
 
 #include "analysis/shared_sources.h"
+#include "analysis/unused_conditions.h"
+#include "analysis/upper_median.h"
 #include "analysis/variance_components.h"
 #include "calibration/distributions.h"
 #include "datasets/error.h"
@@ -199,6 +201,15 @@ Budget budget_of(const LocationMeans& means, const VarianceComponents& component
 Summary summarize_locations(const CampaignData& data, const Reduction& reduction) {
   Summary summary;
   const Grouping grouping = group(data, reduction);
+/// Those that the model holds constant, and how far that moves C_T beside what it is said to be known to.
+void note_conditions(const CampaignData& data, const Reduction& reduction, Summary& summary) {
+  std::vector<double> u95_percent;
+  for (const LocationSummary& location : summary.locations)
+    if (std::isfinite(location.c_t.u95)) u95_percent.push_back(100 * location.c_t.u95 / location.c_t.mean);
+  for (std::string& note : notes_of_unused_conditions(data, reduction, upper_median(u95_percent)))
+    summary.notes.push_back(std::move(note));
+}
+
   std::vector<double> c_t, u;
   for (const RunCoefficients& run : reduction.runs) {
     c_t.push_back(run.c_t);
@@ -248,3 +259,4 @@ Summary summarize_locations(const CampaignData& data, const Reduction& reduction
 }
 
 }  // namespace tunnelrig
+  note_conditions(data, reduction, summary);
