@@ -39,7 +39,10 @@ function unevenThrust({greatest_uneven_percent: uneven}) {
   if (!uneven) return '';
   const side = uneven.value < 0 ? 'right' : 'left';
   const value = `${percent(uneven)}, the ${side} pair lifting less`;
-  return `The uneven thrust U is largest at ${place(uneven)}: ${value}.`;
+  const offset = known(uneven.offset) && percent({value: uneven.offset, u95: uneven.offset_u95});
+  return offset ?
+      `Less the rig’s own offset of ${offset}, the uneven thrust U is largest at ${place(uneven)}: ${value}.` :
+      `The uneven thrust U as measured, the rig’s own offset included, is largest at ${place(uneven)}: ${value}.`;
 }
 
 /** What the model in force corrects for, and what that gained. */
