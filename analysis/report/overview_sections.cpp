@@ -143,6 +143,7 @@ Json summary_section(const Material& material) {
   }
   json["reduced_runs"] = material.reduction->runs.size();
   json["locations"] = material.summary->locations.size();
+  json["u95_without"] = material.summary->u95_without;
   for (const LocationSummary& location : material.summary->locations) {
     if (location.label == "OS" || location.label == "OT")
       json["c_t"].push_back(value_at(location.label, location.c_t.mean, location.c_t.u95));

@@ -87,6 +87,12 @@ function verdict({calibration_passed: passed}) {
   return `The calibration ${passed ? 'passed all its gates' : 'did not pass all its gates'}.`;
 }
 
+function whatPlusMinusIs({u95_without: without}) {
+  if (!without.length) return 'Every ± on this page is U95, which holds the value with 95 % probability.';
+  return `Every ± on this page is U95 without the scatter between ${without.join(' and ')}, which no location ` +
+      'shows: it holds the value with less than 95 % probability.';
+}
+
 function summaryText(summary) {
   const places = {OT: 'in the middle of the tunnel (OT)', OS: 'in open space (OS)'};
   const c_t = (summary.c_t ?? []).map((v) => `${withU95(v.value, v.u95)} ${places[v.location]}`);
@@ -97,7 +103,7 @@ function summaryText(summary) {
       runs, reduced ? `${coefficients()} give coefficients.` : 'none gives coefficients yet.',
       c_t.length && `C_T is ${c_t.join(' and ')}.`, changeOfThrust(summary), unevenThrust(summary),
       modelInForce(summary), bestController(summary), losses(summary), verdict(summary), ...summary.missing,
-      reduced && 'Every ± on this page is U95, which holds the value with 95 % probability.');
+      reduced && whatPlusMinusIs(summary));
 }
 
 function headOfCampaign() {
