@@ -96,7 +96,7 @@ MeasuredRegion measured_region(const DisturbanceMap& map) {
 }
 
 std::vector<std::vector<TunnelPoint>> hatching(const MeasuredRegion& region, double apart) {
-  constexpr double kShortest = 1e-3;  // of the line; less is no line
+  constexpr double kShortest = 0.02;  // of a line that is seen as one
   std::vector<std::vector<TunnelPoint>> lines;
   const auto add = [&lines](const TunnelPoint& a, const TunnelPoint& b) {
     if (std::hypot(b.y_norm - a.y_norm, b.z_norm - a.z_norm) > kShortest) lines.push_back({a, b});

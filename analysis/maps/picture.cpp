@@ -150,6 +150,13 @@ std::string axes_in_metres_too(const MapGeometry& geometry) {
 
 std::string plain_axes() { return "set xtics -1,0.5,1 nomirror out\nset ytics -1,0.5,1 nomirror out\n"; }
 
+/// A line of the title; on that of the note there is no room for both.
+std::string legend(bool dashed, bool hatched) {
+  if (!dashed && !hatched) return "";
+  return fmt::format("\\n{{/*0.8 {}{}{}}}", dashed ? "dashed: mirrored" : "", dashed && hatched ? "; " : "",
+                     hatched ? "hatched: beyond the locations" : "");
+}
+
 std::string plot(bool hatched, bool dashed, double scale) {
   std::string command = "plot $field using 1:2:3 with image notitle";
   if (hatched)
@@ -231,8 +238,8 @@ DrawnPicture draw_picture(const Picture& picture, const PictureFrame& frame) {
   setup += colours(picture) + margins(frame);
   setup += frame.titled ? axes_in_metres_too(picture.geometry) : plain_axes();
   if (frame.titled)
-    setup += fmt::format("set title \"{}\\n{{/*0.8 {}{}{}}}\"\n", picture.title, picture.note,
-                         dashed ? "; dashed: mirrored" : "", hatched ? "; hatched: beyond them" : "");
+    setup += fmt::format("set title \"{}\\n{{/*0.8 {}}}{}\"\n", picture.title, picture.note,
+                         legend(dashed, hatched));
   // Not as cblabel, which long numbers on the bar push out of the picture.
   setup += fmt::format("set label '{}' at screen {:.5f},{:.5f} center rotate by 90\n", picture.colour_label,
                        frame.bar_label, (frame.bottom + frame.top) / 2);

@@ -79,9 +79,9 @@ TEST(MeasuredRegion, IsInTheFileAndInThePictures) {
   picture.hatching = hatching(measured_region(map), 0.05);
   const std::string script = gnuplot_script(picture, "p");
   EXPECT_THAT(script, HasSubstr("$hatching with lines"));
-  EXPECT_THAT(script, HasSubstr("hatched: beyond them"));
+  EXPECT_THAT(script, HasSubstr("hatched: beyond the locations"));
   write_maps(folder.path(), fit_maps(input), {.nodes = 5});
-  EXPECT_THAT(read_text(folder / "delta_ct.svg"), HasSubstr("hatched: beyond them"));
+  EXPECT_THAT(read_text(folder / "delta_ct.svg"), HasSubstr("hatched: beyond the locations"));
 }
 
 }  // namespace
