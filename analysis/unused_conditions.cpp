@@ -15,6 +15,8 @@
 namespace tunnelrig {
 namespace {
 
+constexpr const char* kPressure = "air_pressure";  // far from the model's in most places, and so always named
+
 /// C_T with the condition as recorded over C_T without it; nothing where it was not recorded.
 using Ratio = std::function<std::optional<double>(const Run&)>;
 
@@ -79,6 +81,14 @@ std::string sentence(const UnusedCondition& condition, double u95_percent) {
   return text + fmt::format(" (`reduce --with {}` takes it in)", condition.term);
 }
 
+/// Of a speed that was kept there is nothing to say.
+bool says_something(const UnusedCondition& condition, double u95_percent) {
+  constexpr double kRounded = 0.005;
+  const double apart = std::isfinite(u95_percent) ? u95_percent : kRounded;
+  return condition.recorded < condition.runs || std::abs(condition.c_t_percent) >= kRounded ||
+         std::abs(condition.furthest_c_t_percent - condition.c_t_percent) > apart;
+}
+
 bool adopted(const AppliedModel& model, const std::string& effect) {
   return std::ranges::find(model.effect_names, effect) != model.effect_names.end();
 }
@@ -101,9 +111,9 @@ std::vector<UnusedCondition> unused_conditions(const CampaignData& data, const s
   const auto add = [&](bool enters, UnusedCondition condition, const char* column, const Ratio& ratio) {
     if (enters || adopted(model, condition.term)) return;
     compare(data, runs, column, ratio, condition);
-    condition.mean_text = condition.term == "air_humidity"   ? fmt::format("{:.0f} %", 100 * condition.mean)
-                          : condition.term == "air_pressure" ? fmt::format("{:.0f} Pa", condition.mean)
-                                                             : fmt::format("{:.0f} rev/min", condition.mean);
+    condition.mean_text = condition.term == "air_humidity" ? fmt::format("{:.0f} %", 100 * condition.mean)
+                          : condition.term == kPressure    ? fmt::format("{:.0f} Pa", condition.mean)
+                                                           : fmt::format("{:.0f} rev/min", condition.mean);
     unused.push_back(std::move(condition));
   };
   add(terms.air_pressure,
@@ -111,7 +121,7 @@ std::vector<UnusedCondition> unused_conditions(const CampaignData& data, const s
        .taken_for = fmt::format("taken for {:.0f} Pa", thesis::kPressure_Pa),
        .if_unrecorded = "C_T is off by as many per cent as the pressure was, which weather makes 1 % and "
                         "500 m of height 6 %",
-       .term = "air_pressure"},
+       .term = kPressure},
       "air_pressure_Pa", by_pressure);
   add(terms.air_humidity,
       {.quantity = "humidity",
@@ -134,7 +144,8 @@ std::vector<std::string> notes_of_unused_conditions(const CampaignData& data, co
   for (const RunCoefficients& run : reduction.runs) runs.push_back(run.run);
   std::vector<std::string> notes;
   for (const UnusedCondition& condition : unused_conditions(data, runs, reduction.terms, reduction.model))
-    notes.push_back(sentence(condition, u95_percent));
+    if (condition.term == kPressure || says_something(condition, u95_percent))
+      notes.push_back(sentence(condition, u95_percent));
   return notes;
 }
 

@@ -64,6 +64,7 @@ TEST(UnusedConditions, TheLocationThatIsFurthestFromTheMeanIsNamed) {
     if (run.location == "OS") run.numbers["speed_rpm"] = 4900;
   const std::string said = notes(data);
   EXPECT_THAT(said, HasSubstr("it makes C_T 2.06 % greater than it stands here, that of OS 4.12 % greater"));
+  EXPECT_THAT(notes(campaign("101325,,5000")), Not(HasSubstr("speed: taken for nominal")));
   EXPECT_THAT(said, HasSubstr("C_T 0.00 % greater than it stands here, where")) << "all alike: " << said;
 }
 
