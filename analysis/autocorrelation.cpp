@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <vector>
 
@@ -24,27 +25,50 @@ double normal_of_student_t(double t, double dof) {
   return std::copysign(size, t);
 }
 
-}  // namespace
+/// Geyer's sum of autocovariances, the first of them, and how many on both sides of it were added.
+struct Covariances {
+  double sum = 0, own = 0, added = 1;
 
-double variance_of_mean(std::span<const double> series) {
-  if (series.size() < 4) return 0;
-  const auto count = static_cast<double>(series.size());
+  /// Values for each that counts in an estimate of the sum: twice what noise of this sum has for each
+  /// independent one, or all that were added where that is less. Of three quarters of the series at most.
+  double per_degree(double count) const {
+    return own > 0 ? std::clamp(std::min(added, 2 * sum / own), 1.0, 0.75 * count) : 1;
+  }
+};
+
+Covariances covariances_of(std::span<const double> series) {
   const double mean = mean_of(series);
   std::vector<double> centred(series.begin(), series.end());
   for (double& value : centred) value -= mean;
 
   const double own = autocovariance(centred, 0);
   double sum = -own;
-  double last_pair = INFINITY;
+  double last_pair = INFINITY, added = 1;
   for (std::size_t lag = 0; lag + 1 < series.size() / 2; lag += 2) {
     const double pair = autocovariance(centred, lag) + autocovariance(centred, lag + 1);
     if (pair <= 0) break;
     last_pair = std::min(last_pair, pair);
     sum += 2 * last_pair;
+    added = 2 * static_cast<double>(lag) + 3;
   }
   // Blocks that alternate make the mean better known than independent ones; a series of them never makes it
   // certain.
-  return std::max(sum, 0.05 * own) / (count - 1);
+  return {std::max(sum, 0.05 * own), own, added};
+}
+
+}  // namespace
+
+double variance_of_mean(std::span<const double> series) {
+  if (series.size() < 4) return 0;
+  return covariances_of(series).sum / (static_cast<double>(series.size()) - 1);
+}
+
+MeanKnowledge knowledge_of_mean(std::span<const double> series) {
+  if (series.size() < 4) return {0, std::numeric_limits<double>::infinity()};
+  const auto count = static_cast<double>(series.size());
+  const Covariances covariances = covariances_of(series);
+  const double each = covariances.per_degree(count);
+  return {covariances.sum / (count - each), std::max(1.0, count / each - 1)};
 }
 
 Trend trend_of(std::span<const double> series) {
@@ -68,7 +92,11 @@ Trend trend_of(std::span<const double> series) {
   const double of_mean = std::max(variance_of_mean(residual), squares / (count * (count - 1)));
   const double error = std::sqrt(of_mean * count * (count - 1) / ((count - 2) * spread)) * (count - 1);
   const double change = slope * (count - 1);
-  return {change, error > 0 ? normal_of_student_t(change / error, count - 2) : 0};
+  // Short series resemble slow noise by chance; of fewer degrees of freedom nothing would be a drift.
+  constexpr double kFewest = 5;
+  const double independent = count / covariances_of(residual).per_degree(count);
+  const double dof = std::max(independent - 2, std::min(count - 2, kFewest));
+  return {change, error > 0 ? normal_of_student_t(change / error, dof) : 0};
 }
 
 }  // namespace tunnelrig

@@ -4,6 +4,7 @@
 #include "analysis/misread_runs.h"
 #include "analysis/reduction.h"
 #include "analysis/spectrum.h"
+#include "analysis/unused_conditions.h"
 #include "datasets/error.h"
 #include "datasets/recorded_rate.h"
 
@@ -18,6 +19,7 @@
 namespace tunnelrig {
 namespace {
 
+constexpr double kMovesC_T_percent = 0.3;    // on average: half of what the tolerance of the speed does
 constexpr double kTachometerAgrees = 0.005;  // shaft line against tachometer
 
 std::string with_share(const std::string& name, std::uint64_t frames, std::uint64_t of) {
@@ -143,6 +145,21 @@ class Fitness : public Findings {
       }
       if (missing.empty()) continue;
       add({severity, "metadata", fmt::format("{} is missing in {}", column, missing.text()), why});
+    }
+  }
+
+  /// What the thesis's model holds constant and was recorded otherwise.
+  void conditions() {
+    std::vector<std::size_t> runs;
+    for (std::size_t r = 0; r < data_.runs.size(); ++r)
+      if (data_.runs[r].kind == RunKind::kThrust && data_.runs[r].excluded.empty()) runs.push_back(r);
+    for (const UnusedCondition& condition : unused_conditions(data_, runs)) {
+      if (std::abs(condition.c_t_percent) < kMovesC_T_percent) continue;
+      note(condition.quantity,
+           fmt::format("{} by the thesis's model; as recorded ({} on average) it makes C_T {}",
+                       condition.taken_for, condition.mean_text,
+                       UnusedCondition::change(condition.c_t_percent)),
+           fmt::format("U95 does not hold that: `reduce --with {}` takes it in", condition.term));
     }
   }
 
@@ -287,6 +304,7 @@ std::vector<Finding> fitness(const CampaignFile& file, const CampaignData& data)
   checks.geometry();
   checks.channels();
   checks.metadata();
+  checks.conditions();
   checks.speeds();
   checks.drifts();
   checks.thrusts();

@@ -1,6 +1,8 @@
 #include "analysis/location_summary.h"
 
 #include "analysis/shared_sources.h"
+#include "analysis/unused_conditions.h"
+#include "analysis/upper_median.h"
 #include "analysis/variance_components.h"
 #include "calibration/distributions.h"
 #include "datasets/error.h"
@@ -106,9 +108,10 @@ Scatter scatter_of(const Grouping& grouping, std::vector<double> values, bool re
   return scatter;
 }
 
-void note_components(const VarianceComponents& components, const Reduction& reduction,
-                     std::vector<std::string>& notes) {
+void note_components(const VarianceComponents& components, const Reduction& reduction, Summary& summary) {
+  std::vector<std::string>& notes = summary.notes;
   if (!components.run_known && !components.visit_known) {
+    summary.u95_without.emplace_back("repeats");
     const bool noise = std::any_of(reduction.runs.begin(), reduction.runs.end(),
                                    [](const RunCoefficients& run) { return run.c_t_standard_error > 0; });
     notes.emplace_back(noise
@@ -121,7 +124,11 @@ void note_components(const VarianceComponents& components, const Reduction& redu
         "sessions: what runs and sessions scatter cannot be told apart, and is taken as one, of each visit's "
         "own");
   } else if (!components.session_known) {
-    notes.emplace_back("sessions: no location was measured in two sessions, so their scatter is left out");
+    summary.u95_without.emplace_back("sessions");
+    notes.emplace_back(
+        "sessions: no location was measured in two sessions, so their scatter is left out, and what "
+        "stands as U95 holds the truth in less than 95 %; measure one location, such as OT, in every "
+        "session");
   }
 }
 
@@ -194,6 +201,15 @@ Budget budget_of(const LocationMeans& means, const VarianceComponents& component
   return budget;
 }
 
+/// Those that the model holds constant, and how far that moves C_T beside what it is said to be known to.
+void note_conditions(const CampaignData& data, const Reduction& reduction, Summary& summary) {
+  std::vector<double> u95_percent;
+  for (const LocationSummary& location : summary.locations)
+    if (std::isfinite(location.c_t.u95)) u95_percent.push_back(100 * location.c_t.u95 / location.c_t.mean);
+  for (std::string& note : notes_of_unused_conditions(data, reduction, upper_median(u95_percent)))
+    summary.notes.push_back(std::move(note));
+}
+
 }  // namespace
 
 Summary summarize_locations(const CampaignData& data, const Reduction& reduction) {
@@ -207,7 +223,7 @@ Summary summarize_locations(const CampaignData& data, const Reduction& reduction
   const Scatter c_t_scatter = scatter_of(grouping, c_t, true);
   const bool has_u = data.info.rig.rotors == kMaxRotors;
   const Scatter u_scatter = has_u ? scatter_of(grouping, u, false) : Scatter{};
-  note_components(c_t_scatter.components, reduction, summary.notes);
+  note_components(c_t_scatter.components, reduction, summary);
 
   const std::vector<SharedSource> sources =
       shared_sources(data, reduction, grouping.location_of, c_t_scatter.means.mean, summary.notes);
@@ -244,6 +260,7 @@ Summary summarize_locations(const CampaignData& data, const Reduction& reduction
     summary.c_t_covariance += source.c_t * source.covariance * source.c_t.transpose();
     if (has_u) summary.u_covariance += source.u * source.covariance * source.u.transpose();
   }
+  note_conditions(data, reduction, summary);
   return summary;
 }
 

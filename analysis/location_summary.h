@@ -53,6 +53,9 @@ struct Summary {
   /// sum over locations with weights w and variance u² has ν = u⁴ / Σ (wᵀ S w)².
   std::vector<Eigen::MatrixXd> c_t_over_root_dof, u_over_root_dof;
   std::vector<std::string> notes;  // what was left out of the budget, and why
+  /// "repeats", "sessions": scatter that the campaign does not show. What stands as U95 is without it, and
+  /// holds the truth in less than 95 %.
+  std::vector<std::string> u95_without;
 };
 
 /// Throws InputError where one label stands at two places.

@@ -66,7 +66,8 @@ struct AppliedModel {
   std::vector<std::string> effects;  // in words
   Eigen::MatrixXd covariance;        // of its parameters
   double dof = std::numeric_limits<double>::infinity();
-  double pressure_exponent = 0;  // C_T is corrected by p to this power
+  double pressure_exponent = 0;                // C_T is corrected by p to this power
+  std::vector<std::string> effect_names = {};  // "air_pressure"
 };
 
 struct Reduction {

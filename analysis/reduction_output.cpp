@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 namespace tunnelrig {
@@ -82,7 +83,7 @@ std::string locations_csv(const Summary& summary, const Reduction& reduction, co
   for (int rotor = 1; rotor <= rig.rotors; ++rotor) csv += fmt::format(",c_rotor_{}", rotor);
   csv += ",c_t_dof";
   for (const BudgetPart& part : kBudget) csv += fmt::format(",c_t_u_{}", part.name);
-  csv += ",convention,model\n";
+  csv += ",convention,model,u95_without\n";
   for (const LocationSummary& location : summary.locations) {
     const auto u_cell = [&](double value) { return has_u ? cell(value, "{:.6f}") : std::string(); };
     csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", csv_cell(location.label), cell(location.y_norm),
@@ -95,7 +96,8 @@ std::string locations_csv(const Summary& summary, const Reduction& reduction, co
     csv += "," + cell(location.c_t.dof, "{:.1f}");
     for (const BudgetPart& part : kBudget)
       csv += "," + cell(factor * (location.budget.*part.value), "{:.4g}");
-    csv += fmt::format(",{},{}\n", name_of(convention), csv_model(reduction));
+    csv += fmt::format(",{},{},{}\n", name_of(convention), csv_model(reduction),
+                       fmt::join(summary.u95_without, "+"));
   }
   return csv;
 }
@@ -140,6 +142,7 @@ std::string reduction_json(const CampaignData& data, const Reduction& reduction,
     json["left_out"].push_back({{"run", run.run}, {"reason", run.reason}, {"problem", run.problem}});
   }
   json["notes"] = summary.notes;
+  json["u95_without"] = summary.u95_without;
   return json.dump(1);
 }
 

@@ -12,7 +12,8 @@ namespace tunnelrig {
 
 /// One row per location, open space included:
 /// location,y_norm,z_norm,runs,c_t,c_t_std,c_t_u95,u_percent,u_percent_std, u_percent_u95, then sessions,
-/// thrust, rotors, degrees of freedom, the budget, convention and model. Empty cells are not known.
+/// thrust, rotors, degrees of freedom, the budget, convention, model and what U95 is without. Empty cells are
+/// not known.
 std::string locations_csv(const Summary& summary, const Reduction& reduction, const Rig& rig,
                           Convention convention);
 

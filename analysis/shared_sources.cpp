@@ -1,5 +1,7 @@
 #include "analysis/shared_sources.h"
 
+#include "analysis/autocorrelation.h"
+
 #include <algorithm>
 #include <limits>
 
@@ -74,6 +76,23 @@ void add_propellers(const CampaignData& data, const Places& places, const Reduct
                                   }));
 }
 
+/// How well a channel's mean of a tare is known, from the windows that are stored of it; the standard error's
+/// variance is that of the whole run's blocks, and as much larger as slow noise makes it.
+MeanKnowledge knowledge_of_tare(const CampaignData& data, const TareReading& tare, std::size_t channel) {
+  constexpr double kUnknownDof = 50;  // of statistics without windows
+  const RunStatistics& statistics = data.statistics.at(tare.run);
+  const std::size_t channels = statistics.channels.size();
+  std::vector<double> windows;
+  for (std::size_t i = channel; i < statistics.window_means_V.size(); i += channels)
+    if (std::isfinite(statistics.window_means_V[i])) windows.push_back(statistics.window_means_V[i]);
+  const double square = tare.standard_error_V[channel] * tare.standard_error_V[channel];
+  constexpr std::size_t kFewWindows = 8;
+  const double plain = variance_of_mean(windows);
+  if (windows.size() < kFewWindows || !(plain > 0)) return {square, kUnknownDof};
+  const MeanKnowledge known = knowledge_of_mean(windows);
+  return {square * known.variance / plain, known.dof};
+}
+
 /// One source per channel, whose parameters are the tares. How the zero wanders between them is the runs' own
 /// and in their scatter.
 void add_tares(const CampaignData& data, const Places& places, const Reduction& reduction,
@@ -83,12 +102,14 @@ void add_tares(const CampaignData& data, const Places& places, const Reduction& 
   for (int rotor = 0; rotor < data.info.rig.rotors; ++rotor) {
     const auto channel = static_cast<std::size_t>(rotor);
     Eigen::VectorXd variance(static_cast<Eigen::Index>(tares.size()));
+    double over_dof = 0;  // mean of 1/ν
     for (std::size_t t = 0; t < tares.size(); ++t) {
-      variance(static_cast<Eigen::Index>(t)) =
-          tares[t].standard_error_V[channel] * tares[t].standard_error_V[channel];
+      const MeanKnowledge known = knowledge_of_tare(data, tares[t], channel);
+      variance(static_cast<Eigen::Index>(t)) = known.variance;
+      over_dof += 1 / known.dof / static_cast<double>(tares.size());
     }
     sources.push_back(shared_source(&Budget::tare, places, reduction, data.info.rig, variance.asDiagonal(),
-                                    50, [&](const RunCoefficients& run) {
+                                    1 / over_dof, [&](const RunCoefficients& run) {
                                       Eigen::MatrixXd slope =
                                           Eigen::MatrixXd::Zero(data.info.rig.rotors, variance.size());
                                       if (!run.tare) return slope;

@@ -1,6 +1,7 @@
 #include "analysis/variance_components.h"
 
 #include "analysis/restricted_likelihood.h"
+#include "analysis/scatter_draws.h"
 #include "calibration/distributions.h"
 
 #include <algorithm>
@@ -276,6 +277,7 @@ VarianceComponents fit_variance_components(const GroupedRuns& runs) {
   const double scale = std::max(squares / static_cast<double>(std::max<std::size_t>(freedom, 1)), 1e-300);
   maximise(design, components.visit_known, components.session_known, scale, components);
   components.covariance = covariance_of_estimates(design, components);
+  components.scatter = draw_scatter(design, components);
   return components;
 }
 
@@ -309,7 +311,12 @@ LocationMeans location_means(const GroupedRuns& runs, const VarianceComponents& 
     share(static_cast<Eigen::Index>(visit.location), static_cast<Eigen::Index>(visit.session)) =
         visit.runs / total[visit.location];
   }
-  means.covariance = components.session * share * share.transpose();
+  ScatterDraws scatter = components.scatter;
+  if (scatter.total.size() == 0) {
+    scatter.visit = components.visit;
+    scatter.session = components.session;
+  }
+  means.covariance = scatter.session * share * share.transpose();
   for (std::size_t l = 0; l < n; ++l) {
     const auto row = static_cast<Eigen::Index>(l);
     means.runs[l] = static_cast<int>(total[l]);
@@ -317,15 +324,15 @@ LocationMeans location_means(const GroupedRuns& runs, const VarianceComponents& 
         total[l] > 1 ? std::sqrt(squares[l] / (total[l] - 1)) : std::numeric_limits<double>::quiet_NaN();
     const double concentration = share.row(row).squaredNorm();
     means.run_part[l] = components.run_known ? components.run_by_location[l] / total[l] : 0;
-    means.visit_part[l] = components.visit * concentration;
-    means.session_part[l] = components.session * concentration;
+    means.visit_part[l] = scatter.visit * concentration;
+    means.session_part[l] = scatter.session * concentration;
     means.covariance(row, row) += means.run_part[l] + means.visit_part[l];
     const double variance = means.covariance(row, row);
-    const double run_variance =
-        components.run_known ? 2 * means.run_part[l] * means.run_part[l] / components.run_dof[l] : 0;
-    const double of_estimates = concentration * concentration * components.covariance.sum() + run_variance;
-    means.dof[l] = of_estimates > 0 ? std::max(1.0, 2 * variance * variance / of_estimates)
-                                    : std::numeric_limits<double>::infinity();
+    const double run_dof =
+        components.run_known ? components.run_dof[l] : std::numeric_limits<double>::infinity();
+    means.dof[l] = scatter.total.size() > 0 && variance > 0
+                       ? dof_of(scatter, means.run_part[l], run_dof, concentration, variance)
+                       : std::max(1.0, run_dof);
   }
   return means;
 }

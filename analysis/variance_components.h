@@ -14,6 +14,14 @@ struct GroupedRuns {
   std::vector<double> value;
 };
 
+/// What visit and session may vary by together, from few of them: values with their probabilities, and the
+/// value in the middle as its two parts. Empty where nothing is to be drawn: the components stand as they
+/// are.
+struct ScatterDraws {
+  Eigen::ArrayXd total, probability;
+  double visit = 0, session = 0;
+};
+
 /// Variances of y = location + session + visit + run, where a visit is what one location saw of one session.
 ///
 /// Runs within a visit give the run variance of each location, moderated: a location of few runs leans on the
@@ -30,18 +38,20 @@ struct VarianceComponents {
   double visit = 0;
   double session = 0;
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  // of the estimates (visit, session)
+  ScatterDraws scatter;
 };
 
 VarianceComponents fit_variance_components(const GroupedRuns& runs);
 
-/// Means of locations (plain, over their runs) with the covariance that the components give them.
+/// Means of locations (plain, over their runs) with the covariance that the components give them, visit and
+/// session by the middle of their draws: a maximum at 0 is no evidence that there is none.
 struct LocationMeans {
   std::vector<double> mean;
   std::vector<double> std;  // over the runs of the location; NaN for a single run
   std::vector<int> runs, sessions;
   Eigen::MatrixXd
       covariance;  // n × n: runs of one session are not independent, nor are locations that share one
-  std::vector<double> dof;  // of the variance of each mean (Welch–Satterthwaite)
+  std::vector<double> dof;  // of the variance of each mean: t(0.975, dof) is that of the draws
   std::vector<double> run_part, visit_part, session_part;  // variances of the mean, its budget
 };
 

@@ -1,4 +1,5 @@
 #include "analysis/implausible_thrust.h"
+#include "analysis/maps/measured_region.h"
 #include "analysis/maps/write_maps.h"
 #include "analysis/model/model_store.h"
 #include "analysis/reduction_output.h"
@@ -86,8 +87,22 @@ void print(const WrittenMaps& written) {
   fmt::print("\n");
   if (const auto& offset = written.map.uneven_thrust_fit.offset)
     fmt::print("offset of the rig in U, taken out of the map: {}\n", offset_text(*offset));
+  fmt::print("{:.0f} % of the square is beyond the locations and their mirror images\n",
+             100 * measured_region(written.map).share_outside());
   fmt::print("{} locations, {}; {} files in {}\n", written.map.locations.size(), written.map.method,
              written.files.size(), written.files.empty() ? "" : written.files[0].parent_path().string());
+}
+
+/// Where no location is on the far side, neither method's uncertainty holds what it says.
+void warn_of_extrapolation(const DisturbanceMap& map) {
+  constexpr double kMore = 0.1;  // than around the thesis's locations, which leave 6 %
+  const double share = measured_region(map).share_outside();
+  if (share <= kMore) return;
+  warn(fmt::format(
+      "{:.0f} % of the square is beyond the measured locations and their mirror images (hatched): "
+      "the map extrapolates there, and its U95 is too small; measure closer to walls, ground and "
+      "ceiling",
+      100 * share));
 }
 
 /// Before anything is reduced and fitted.
@@ -149,6 +164,7 @@ int run_map(const MapOptions& options) {
                     "(check propellers.csv, "
                     "arms, cells); it has been taken out of the map",
                     offset_text(*offset)));
+  warn_of_extrapolation(written.map);
   if (written.warning) warn(*written.warning);
   if (options.json) {
     nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},
@@ -156,6 +172,7 @@ int run_map(const MapOptions& options) {
                                 {"model", reduction.model_name()},
                                 {"locations", written.map.locations.size()},
                                 {"not_on_the_map", not_on_map},
+                                {"beyond_percent", 100 * measured_region(written.map).share_outside()},
                                 {"delta_ct", fit_json(written.map.delta_ct_fit)},
                                 {"uneven_thrust", fit_json(written.map.uneven_thrust_fit)}};
     for (const auto& path : written.files) json["files"].push_back(path.string());

@@ -18,6 +18,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 namespace tunnelrig::cli {
@@ -75,8 +76,9 @@ void print_summary(const CampaignData& data, const Reduction& reduction, const S
     return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "-";
   };
   const auto place = [](std::optional<double> value) { return value ? fmt::format("{:g}", *value) : "-"; };
-  Table table({"location", "y_norm", "z_norm", "runs", "C_T", "std", "U95", "U [%]", "std [%]", "U95 [%]",
-               "thrust [N]"});
+  const bool is_whole = summary.u95_without.empty();
+  Table table({"location", "y_norm", "z_norm", "runs", "C_T", "std", is_whole ? "U95" : "U95*", "U [%]",
+               "std [%]", is_whole ? "U95 [%]" : "U95* [%]", "thrust [N]"});
   for (const LocationSummary& location : summary.locations) {
     table.add({location.label, place(location.y_norm), place(location.z_norm),
                fmt::format("{}", location.runs), number(factor * location.c_t.mean, "{:.5f}"),
@@ -88,6 +90,9 @@ void print_summary(const CampaignData& data, const Reduction& reduction, const S
   table.print();
   fmt::print("\n{} runs at {} locations; model {}, convention {}\n", reduction.runs.size(),
              summary.locations.size(), reduction.model_name(), name_of(convention));
+  if (!is_whole)
+    fmt::print("*: without the scatter between {}, which this campaign does not show: too small\n",
+               fmt::join(summary.u95_without, " and "));
   for (const std::string& note : summary.notes) fmt::print("note: {}\n", note);
 }
 

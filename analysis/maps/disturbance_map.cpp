@@ -1,5 +1,6 @@
 #include "analysis/maps/disturbance_map.h"
 
+#include "analysis/maps/measured_region.h"
 #include "datasets/csv.h"
 #include "datasets/error.h"
 
@@ -259,6 +260,14 @@ json location_json(const MeasuredLocation& location) {
           {"uneven_thrust_u95_percent", location.uneven_thrust_u95_percent}};
 }
 
+json region_json(const DisturbanceMap& map) {
+  const MeasuredRegion region = measured_region(map);
+  json corners = json::array();
+  for (const auto& [y_norm, z_norm] : region.corners())
+    corners.push_back({y_norm + 0.0, z_norm + 0.0});  // without −0
+  return corners;
+}
+
 json to_json(const DisturbanceMap& map) {
   json reference = {{"c_t_origin", map.c_t_origin}};
   if (map.c_t_open_space) reference["c_t_open_space"] = *map.c_t_open_space;
@@ -278,6 +287,7 @@ json to_json(const DisturbanceMap& map) {
            {{"delta_ct", fit_json(map.delta_ct_fit)}, {"uneven_thrust", fit_json(map.uneven_thrust_fit)}}},
           {"provenance", json::parse(map.provenance)},
           {"locations", locations},
+          {"measured_region", region_json(map)},
           {"y_norm", map.grid.y_norm},
           {"z_norm", map.grid.z_norm},
           {"delta_ct_percent", matrix_json(map.delta_ct.value_percent, map.grid)},

@@ -24,6 +24,13 @@ struct FieldEstimate {
   double u95() const;  // half width of the 95 % interval
 };
 
+/// The field at one location by its own measurement, without what the locations around it say of it.
+struct MeasuredField {
+  std::string label;
+  TunnelPoint point;  // folded onto ȳ ≥ 0, and the value with it
+  FieldEstimate field;
+};
+
 /// One location, predicted by the field fitted with the same hyperparameters to all others; per cent.
 struct LeftOut {
   std::string label;

@@ -44,6 +44,9 @@ class GaussianProcess {
   /// it.
   std::optional<FieldEstimate> offset() const;
 
+  /// Every measured value less that offset.
+  std::vector<MeasuredField> measured() const { return less_offset(offset_, data_); }
+
   /// In closed form. What is predicted is the measurement, with the error that it shares with the others as
   /// far as those show it. An odd field's locations on ȳ = 0 are not listed: symmetry alone decides there.
   std::vector<LeftOut> leave_one_out() const;

@@ -44,13 +44,15 @@ std::vector<ContourLine> without_specks(std::vector<ContourLine> lines) {
   return lines;
 }
 
+std::string polyline(const std::vector<TunnelPoint>& points) {
+  std::string out;
+  for (const TunnelPoint& point : points) out += fmt::format("{:.5f} {:.5f}\n", point.y_norm, point.z_norm);
+  return out + "\n";
+}
+
 std::string polylines(const std::vector<ContourLine>& lines) {
   std::string out;
-  for (const ContourLine& line : lines) {
-    for (const TunnelPoint& point : line.points)
-      out += fmt::format("{:.5f} {:.5f}\n", point.y_norm, point.z_norm);
-    out += "\n";
-  }
+  for (const ContourLine& line : lines) out += polyline(line.points);
   return out;
 }
 
@@ -148,8 +150,18 @@ std::string axes_in_metres_too(const MapGeometry& geometry) {
 
 std::string plain_axes() { return "set xtics -1,0.5,1 nomirror out\nset ytics -1,0.5,1 nomirror out\n"; }
 
-std::string plot(bool dashed, double scale) {
+/// A line of the title; on that of the note there is no room for both.
+std::string legend(bool dashed, bool hatched) {
+  if (!dashed && !hatched) return "";
+  return fmt::format("\\n{{/*0.8 {}{}{}}}", dashed ? "dashed: mirrored" : "", dashed && hatched ? "; " : "",
+                     hatched ? "hatched: beyond the locations" : "");
+}
+
+std::string plot(bool hatched, bool dashed, double scale) {
   std::string command = "plot $field using 1:2:3 with image notitle";
+  if (hatched)
+    command +=
+        fmt::format(", $hatching with lines linecolor rgb '#707070' linewidth {:.3g} notitle", 0.9 * scale);
   if (dashed)
     command +=
         fmt::format(", $mirrored with lines linecolor rgb '#303030' linewidth {:.3g} dashtype (9,6) notitle",
@@ -208,7 +220,7 @@ int bar_letters(const Picture& picture) {
 
 DrawnPicture draw_picture(const Picture& picture, const PictureFrame& frame) {
   const Halves halves = halves_of(picture);
-  const bool dashed = !halves.mirrored.empty();
+  const bool dashed = !halves.mirrored.empty(), hatched = !picture.hatching.empty();
   const auto block = [](const char* name, const std::string& lines) {
     return fmt::format("${} << END\n{}END\n", name, lines);
   };
@@ -218,15 +230,20 @@ DrawnPicture draw_picture(const Picture& picture, const PictureFrame& frame) {
   setup += block("field", field(picture)) + block("measured", polylines(halves.measured)) +
            block("mirrored", polylines(halves.mirrored)) + block("crosses", crosses(picture.locations)) +
            block("labels", labels(labelled, picture.diverging));
+  if (hatched) {
+    std::string lines;
+    for (const std::vector<TunnelPoint>& line : picture.hatching) lines += polyline(line);
+    setup += block("hatching", lines);
+  }
   setup += colours(picture) + margins(frame);
   setup += frame.titled ? axes_in_metres_too(picture.geometry) : plain_axes();
   if (frame.titled)
-    setup += fmt::format("set title \"{}\\n{{/*0.8 {}{}}}\"\n", picture.title, picture.note,
-                         dashed ? "; dashed: mirrored" : "");
+    setup += fmt::format("set title \"{}\\n{{/*0.8 {}}}{}\"\n", picture.title, picture.note,
+                         legend(dashed, hatched));
   // Not as cblabel, which long numbers on the bar push out of the picture.
   setup += fmt::format("set label '{}' at screen {:.5f},{:.5f} center rotate by 90\n", picture.colour_label,
                        frame.bar_label, (frame.bottom + frame.top) / 2);
-  return {setup, plot(dashed, frame.line_scale)};
+  return {setup, plot(hatched, dashed, frame.line_scale)};
 }
 
 std::string gnuplot_script(const Picture& picture, const std::string& stem) {

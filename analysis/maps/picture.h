@@ -19,7 +19,8 @@ struct Picture {
   MapGrid grid;
   std::vector<double> values;
   std::vector<ContourLine> lines;
-  std::vector<TunnelPoint> locations;  // measured; a half without any has dashed lines
+  std::vector<TunnelPoint> locations;              // measured; a half without any has dashed lines
+  std::vector<std::vector<TunnelPoint>> hatching;  // lines over what lies beyond the locations
   MapGeometry geometry;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace tunnelrig {
@@ -43,6 +44,26 @@ std::optional<FieldEstimate> estimate_of(const OffsetWeights& offset, const Fiel
   if (!offset.weights.any()) return {};
   return FieldEstimate{offset.weights.dot(data.values), std::sqrt(offset.variance),
                        effective_dof(data.over_root_dof, offset.weights, offset.variance)};
+}
+
+std::vector<MeasuredField> less_offset(const OffsetWeights& offset, const FieldData& data) {
+  const VectorXd column = column_of_offset(data);
+  std::vector<MeasuredField> measured;
+  for (Index i = 0; i < data.size(); ++i) {
+    const TunnelPoint& point = data.points[static_cast<std::size_t>(i)];
+    if (point.y_norm == 0) continue;
+    const VectorXd weights = VectorXd::Unit(data.size(), i) - column(i) * offset.weights;
+    const double variance =
+        std::max(0.0, data.covariance(i, i) - 2 * column(i) * data.covariance.row(i).dot(offset.weights) +
+                          column(i) * column(i) * offset.variance);
+    measured.push_back(
+        {.label = data.labels[static_cast<std::size_t>(i)],
+         .point = point,
+         .field = {weights.dot(data.values),
+                   data.scatter_known ? std::sqrt(variance) : std::numeric_limits<double>::quiet_NaN(),
+                   effective_dof(data.over_root_dof, weights, variance)}});
+  }
+  return measured;
 }
 
 OffsetWeights offset_weights_on_centre_line(const FieldData& data) {

@@ -11,6 +11,7 @@
 #include "analysis/maps/field_estimate.h"
 
 #include <optional>
+#include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -38,5 +39,9 @@ OffsetWeights offset_weights_on_centre_line(const FieldData& data);
 
 /// β̂ of the data, per cent; nothing where no location shows it.
 std::optional<FieldEstimate> estimate_of(const OffsetWeights& offset, const FieldData& data);
+
+/// Every measured value off ȳ = 0 less the offset h β̂, which it may have had a part in: as an estimate of the
+/// field there its error is e − h wᵀ(f + e), w being β̂'s weights, of the variance Σ − 2 h (Σ w) + u²(β̂).
+std::vector<MeasuredField> less_offset(const OffsetWeights& offset, const FieldData& data);
 
 }  // namespace tunnelrig

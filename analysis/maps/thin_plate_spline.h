@@ -27,6 +27,9 @@ class ThinPlateSpline {
   /// it.
   std::optional<FieldEstimate> offset() const;
 
+  /// Every measured value less that offset.
+  std::vector<MeasuredField> measured() const { return less_offset(offset_, data_); }
+
   /// In closed form. A location that alone decides the spline's slope cannot be left out and is not listed,
   /// nor is one where symmetry alone decides.
   std::vector<LeftOut> leave_one_out() const;

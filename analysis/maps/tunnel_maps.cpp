@@ -61,6 +61,10 @@ std::optional<FieldEstimate> offset_of(const FittedField& field) {
   return std::visit([](const auto& fitted) { return fitted.offset(); }, field);
 }
 
+std::vector<MeasuredField> measured_field(const FittedField& field) {
+  return std::visit([](const auto& fitted) { return fitted.measured(); }, field);
+}
+
 std::vector<LeftOut> leave_one_out(const FittedField& field) {
   return std::visit([](const auto& fitted) { return fitted.leave_one_out(); }, field);
 }

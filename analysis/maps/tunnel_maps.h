@@ -47,6 +47,10 @@ FieldEstimate estimate_at(const FittedField& field, const TunnelPoint& point);
 /// location shows it, and none of ΔC_T.
 std::optional<FieldEstimate> offset_of(const FittedField& field);
 
+/// Every measured value off the middle plane, on ȳ > 0, less that offset: the field as its location alone has
+/// it.
+std::vector<MeasuredField> measured_field(const FittedField& field);
+
 /// How well each location is predicted by the others.
 std::vector<LeftOut> leave_one_out(const FittedField& field);
 

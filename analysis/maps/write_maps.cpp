@@ -2,6 +2,7 @@
 
 #include "analysis/maps/contours.h"
 #include "analysis/maps/gnuplot.h"
+#include "analysis/maps/measured_region.h"
 #include "analysis/maps/picture.h"
 #include "analysis/maps/staging.h"
 #include "datasets/csv.h"
@@ -17,6 +18,7 @@ namespace {
 // Finer than the grid of the files, so that lines are smooth; it holds a column at ȳ = 0, where pictures
 // change from the measured to the mirrored half.
 constexpr int kDrawingNodes = 121;
+constexpr double kHatchingApart = 0.045;
 constexpr int kMostLevels = 14, kMostUncertaintyLevels = 5;
 
 std::vector<std::string> pictures_of(const std::string& drawing, bool with_u95) {
@@ -73,6 +75,7 @@ std::string scripts(const Drawing& drawing, const MapGrid& grid, const TunnelMap
   for (const LocationEstimate& location : maps.input.locations) {
     picture.locations.push_back({location.y_norm, location.z_norm});
   }
+  picture.hatching = hatching(MeasuredRegion(picture.locations), kHatchingApart);
   std::string script = gnuplot_script(picture, drawing.name);
   if (!drawing.layer.u95_known()) return script;
   picture.title = fmt::format("Uncertainty of {}: half width of the 95 % interval", drawing.symbol);

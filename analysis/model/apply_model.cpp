@@ -335,8 +335,10 @@ Reduction apply_model(const CampaignData& data, const Reduction& thesis, const M
   Reduction reduction = thesis;
   reduction.runs.clear();
   reduction.model = {model.version, model.effects(), model.covariance, model.dof, 0};
-  for (const ModelTerm& term : model.terms)
+  for (const ModelTerm& term : model.terms) {
+    reduction.model.effect_names.push_back(term.effect->name);
     if (term.effect->name == "air_pressure") reduction.model.pressure_exponent += term.parameters[0];
+  }
   for (RunCoefficients run : thesis.runs) {
     const std::string& name = data.runs[run.run].run;
     const Index row = row_of.at(name);

@@ -1,3 +1,4 @@
+#include "analysis/maps/measured_region.h"
 #include "analysis/report/sections.h"
 
 #include <fmt/format.h>
@@ -15,6 +16,20 @@ Json layer_json(const MapLayer& layer, const FitSummary& fit) {
   return json;
 }
 
+/// Lines over what lies beyond the locations, as one that has gaps.
+Json beyond_json(const MeasuredRegion& region) {
+  constexpr double kApart = 0.05;
+  Json json{{"percent", 100 * region.share_outside()}, {"y_norm", Json::array()}, {"z_norm", Json::array()}};
+  for (const std::vector<TunnelPoint>& line : hatching(region, kApart)) {
+    for (const TunnelPoint& point : line) {
+      json["y_norm"].push_back(rounded(point.y_norm, 4));
+      json["z_norm"].push_back(rounded(point.z_norm, 4));
+    }
+    for (const char* axis : {"y_norm", "z_norm"}) json[axis].push_back(nullptr);
+  }
+  return json;
+}
+
 }  // namespace
 
 Json maps_section(const Material& material) {
@@ -28,6 +43,7 @@ Json maps_section(const Material& material) {
             {"z_m_per_norm", (geometry.tunnel_height_m - geometry.vehicle_height_m) / 2},  // (4.2)
             {"delta_ct", layer_json(map.delta_ct, map.delta_ct_fit)},
             {"uneven_thrust", layer_json(map.uneven_thrust, map.uneven_thrust_fit)},
+            {"beyond", beyond_json(measured_region(map))},
             {"locations", Json::array()}};
   for (const MeasuredLocation& location : map.locations) {
     json["locations"].push_back(

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <set>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -47,15 +48,39 @@ void add_extremes_of_map(const Material& material, Json& json) {
       value_in_tunnel(*least, least->delta_ct_percent, least->delta_ct_u95_percent);
 }
 
-/// Of the tunnel's locations; of all where none is in a tunnel.
-void add_extreme_of_u(const Material& material, Json& json) {
-  if (material.data.info.rig.rotors != kMaxRotors) {
-    json["missing"].push_back("There is no uneven thrust U: it compares two pairs of rotors.");
+/// Of the tunnel's field where a map tells it from the rig's offset: without that a campaign with an offset
+/// would show the place where the field helps it most, and one on the middle plane where there is none.
+void add_extreme_of_field(const Material& material, Json& json) {
+  const std::vector<MeasuredField> field = measured_field(material.fitted->uneven_thrust);
+  const auto greatest =
+      std::max_element(field.begin(), field.end(), [](const MeasuredField& a, const MeasuredField& b) {
+        return std::abs(a.field.value) < std::abs(b.field.value);
+      });
+  if (greatest == field.end()) {
+    json["missing"].push_back(
+        "Every measured location is on the tunnel's middle plane, where the uneven thrust U is 0 by "
+        "symmetry.");
     return;
   }
+  const auto& locations = material.map->locations;
+  const auto here = std::ranges::find(locations, greatest->label, &MeasuredLocation::label);
+  const double sign = here->y_norm < 0 ? -1 : 1;
+  Json& value = json["greatest_uneven_percent"] =
+      value_in_tunnel(*here, sign * greatest->field.value, greatest->field.u95());
+  value["as_measured"] = here->uneven_thrust_percent;
+  if (const auto& offset = material.map->uneven_thrust_fit.offset) {
+    value["offset"] = offset->value_percent;
+    value["offset_u95"] = maybe(offset->u95_percent);
+  }
+}
+
+/// As measured, where no map tells the rig's offset from the field: of the locations off the middle plane,
+/// else of the tunnel's, else of all.
+void add_extreme_as_measured(const Material& material, Json& json) {
   const LocationSummary* greatest = nullptr;
   const auto rank = [](const LocationSummary& location) {
-    return std::pair(location.y_norm.has_value(), std::abs(location.u_percent.mean));
+    return std::tuple(location.y_norm.value_or(0) != 0, location.y_norm.has_value(),
+                      std::abs(location.u_percent.mean));
   };
   for (const LocationSummary& location : material.summary->locations) {
     if (greatest == nullptr || rank(*greatest) < rank(location)) greatest = &location;
@@ -63,10 +88,20 @@ void add_extreme_of_u(const Material& material, Json& json) {
   if (greatest == nullptr) return;
   Json& value = json["greatest_uneven_percent"] =
       value_at(greatest->label, greatest->u_percent.mean, greatest->u_percent.u95);
+  value["as_measured"] = greatest->u_percent.mean;
   if (greatest->y_norm) {
     value["y_norm"] = *greatest->y_norm;
     value["z_norm"] = *greatest->z_norm;
   }
+}
+
+void add_extreme_of_u(const Material& material, Json& json) {
+  if (material.data.info.rig.rotors != kMaxRotors)
+    json["missing"].push_back("There is no uneven thrust U: it compares two pairs of rotors.");
+  else if (material.map)
+    add_extreme_of_field(material, json);
+  else
+    add_extreme_as_measured(material, json);
 }
 
 /// The effects that the coefficients are corrected for, and what that gained on blocks held out.
@@ -108,6 +143,7 @@ Json summary_section(const Material& material) {
   }
   json["reduced_runs"] = material.reduction->runs.size();
   json["locations"] = material.summary->locations.size();
+  json["u95_without"] = material.summary->u95_without;
   for (const LocationSummary& location : material.summary->locations) {
     if (location.label == "OS" || location.label == "OT")
       json["c_t"].push_back(value_at(location.label, location.c_t.mean, location.c_t.u95));

@@ -4,9 +4,13 @@
 #include "support/seeds.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstdio>
+#include <future>
 #include <numeric>
 #include <random>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -25,6 +29,8 @@ struct Scenario {
   double drift_V = 0;   // likewise, in a straight line
   double tachometer_rpm = 0, thermometer_K = 0;  // systematic, declared in campaign.toml
   bool uneven_scatter = false;                   // locations scatter by factors of 0.4 to 2.5
+  bool anchor = false;  // the first location is measured in every session, the others in one
+  int campaigns = 250;
 };
 
 constexpr double kSession_s = 30000;
@@ -161,7 +167,8 @@ Campaign make_campaign(const Scenario& s, std::mt19937_64& engine) {
     std::iota(choice.begin(), choice.end(), 0);
     std::shuffle(choice.begin(), choice.end(), engine);
     for (int repeat = 0; repeat < s.repeats; ++repeat) {
-      const int session = choice[static_cast<std::size_t>(repeat % (s.visits > 0 ? s.visits : s.sessions))];
+      const bool everywhere = s.visits == 0 || (s.anchor && l == 0);
+      const int session = choice[static_cast<std::size_t>(repeat % (everywhere ? s.sessions : s.visits))];
       const auto si = static_cast<std::size_t>(session);
       const double celsius = 20 + normal(2);
       const double omega = 2 * M_PI * (5000 + tachometer) / 60;  // set to 5000 by a tachometer that is off
@@ -183,70 +190,137 @@ Campaign make_campaign(const Scenario& s, std::mt19937_64& engine) {
   return campaign;
 }
 
-class Coverage : public testing::TestWithParam<Scenario> {};
+/// A share of locations with its standard error.
+struct Held {
+  double rate = 0, error = 0;
+};
 
-TEST_P(Coverage, U95CoversTheTruthInNinetyThreeToNinetySevenPercent) {
-  const std::uint64_t seed = test::seed();
-  SCOPED_TRACE(seed);
+/// A measured error over U95, by campaign and location.
+struct Ratios {
+  std::vector<std::vector<double>> c_t, u;
+};
+
+Ratios ratios_of(const Scenario& scenario, std::uint64_t seed) {
   std::mt19937_64 engine(seed);
-  constexpr int kCampaigns = 250;
-  double c_t_covered = 0, u_covered = 0, total = 0;
-  std::vector<double> c_t_by_campaign, u_by_campaign;
-  for (int i = 0; i < kCampaigns; ++i) {
-    const Campaign campaign = make_campaign(GetParam(), engine);
+  Ratios ratios;
+  for (int i = 0; i < scenario.campaigns; ++i) {
+    const Campaign campaign = make_campaign(scenario, engine);
     const Summary summary = summarize_locations(campaign.data, reduce_runs(campaign.data, {}));
-    double c_t_here = 0, u_here = 0;
+    ratios.c_t.emplace_back();
+    ratios.u.emplace_back();
     for (const LocationSummary& location : summary.locations) {
       const auto l = static_cast<std::size_t>(std::stoi(location.label.substr(1)));
-      c_t_here += std::abs(location.c_t.mean - campaign.c_t[l]) <= location.c_t.u95 ? 1 : 0;
-      u_here += std::abs(location.u_percent.mean - campaign.u_percent[l]) <= location.u_percent.u95 ? 1 : 0;
+      ratios.c_t.back().push_back(std::abs(location.c_t.mean - campaign.c_t[l]) / location.c_t.u95);
+      ratios.u.back().push_back(std::abs(location.u_percent.mean - campaign.u_percent[l]) /
+                                location.u_percent.u95);
     }
-    const auto n = static_cast<double>(summary.locations.size());
-    c_t_covered += c_t_here;
-    u_covered += u_here;
-    total += n;
-    c_t_by_campaign.push_back(c_t_here / n);
-    u_by_campaign.push_back(u_here / n);
   }
-  // Locations of one campaign share errors, so the uncertainty of the score comes from the campaigns.
-  const auto error = [](const std::vector<double>& rates) {
-    const double mean = std::accumulate(rates.begin(), rates.end(), 0.0) / static_cast<double>(rates.size());
-    double square = 0;
-    for (const double rate : rates) square += (rate - mean) * (rate - mean);
-    return std::sqrt(square) / static_cast<double>(rates.size());
-  };
-  const double c_t_rate = c_t_covered / total, u_rate = u_covered / total;
-  const double c_t_error = error(c_t_by_campaign), u_error = error(u_by_campaign);
-  std::printf("%-28s C_T %.2f ± %.2f %%, U %.2f ± %.2f %%\n", GetParam().name, 100 * c_t_rate,
-              100 * c_t_error, 100 * u_rate, 100 * u_error);
-  EXPECT_GT(c_t_rate, 0.93 - 3 * c_t_error);
-  EXPECT_LT(c_t_rate, 0.97 + 3 * c_t_error);
-  EXPECT_GT(u_rate, 0.93 - 3 * u_error);
-  EXPECT_LT(u_rate, 0.97 + 3 * u_error);
+  return ratios;
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Designs, Coverage,
-    testing::Values(
-        Scenario{.name = "randomised"}, Scenario{.name = "no session scatter", .session = 0},
-        Scenario{.name = "large session scatter", .session = 0.005},
-        Scenario{.name = "two visits of five", .repeats = 10, .visits = 2},
-        Scenario{.name = "two visits, visit scatter", .repeats = 10, .visits = 2, .visit = 0.002},
-        Scenario{.name = "three repeats", .locations = 15, .repeats = 3, .sessions = 6},
-        Scenario{.name = "calibration's own zero", .tares = 0},
-        Scenario{.name = "instruments declared", .tachometer_rpm = 7.5, .thermometer_K = 0.5},
-        Scenario{.name = "ordinary gauge", .gauge_N = 0.02, .reading_V = 0.002},
-        Scenario{.name = "coarse gauge", .gauge_N = 0.1},
-        Scenario{.name = "locations scatter unevenly", .repeats = 10, .uneven_scatter = true},
-        Scenario{.name = "random walk of the zero", .tares = 3, .wander_V = 0.01},
-        Scenario{.name = "drift of the zero", .drift_V = 0.02},
-        Scenario{.name = "four sessions", .sessions = 4},
-        Scenario{.name = "the thesis's size", .locations = 42, .repeats = 10, .sessions = 14, .visits = 2}),
-    [](const auto& scenario) {
-      std::string name = scenario.param.name;
-      std::erase_if(name, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; });
-      return name;
-    });
+/// The share whose interval holds the truth if every U95 were `factor` of itself. Locations of one campaign
+/// share errors, so the uncertainty comes from the campaigns.
+Held held(const std::vector<std::vector<double>>& ratios, double factor) {
+  std::vector<double> rates;
+  for (const std::vector<double>& campaign : ratios)
+    rates.push_back(
+        static_cast<double>(std::ranges::count_if(campaign, [&](double r) { return r <= factor; })) /
+        static_cast<double>(campaign.size()));
+  const auto n = static_cast<double>(rates.size());
+  Held result{.rate = std::accumulate(rates.begin(), rates.end(), 0.0) / n};
+  for (const double rate : rates) result.error += std::pow(rate - result.rate, 2);
+  result.error = std::sqrt(result.error) / n;
+  return result;
+}
+
+/// Of scenarios with seeds of their own.
+Held mean_of(const std::vector<Held>& all) {
+  Held mean;
+  for (const Held& each : all) {
+    mean.rate += each.rate / static_cast<double>(all.size());
+    mean.error += std::pow(each.error / static_cast<double>(all.size()), 2);
+  }
+  mean.error = std::sqrt(mean.error);
+  return mean;
+}
+
+/// The gate of a single scenario: from 94.5 % upwards, but for three standard errors.
+bool passes(const Held& held) { return held.rate > 0.945 - 3 * held.error; }
+
+/// The gate of all together, whose standard error is a quarter of a per cent. Few visits make intervals wide,
+/// so that the mean may be above 95 %.
+bool passes_together(const Held& held) { return held.rate > 0.942 && held.rate < 0.98; }
+
+const std::vector<Scenario> kScenarios = {
+    {.name = "randomised"},
+    {.name = "no session scatter", .session = 0},
+    {.name = "large session scatter", .session = 0.005},
+    {.name = "two visits of five", .repeats = 10, .visits = 2},
+    {.name = "two visits, visit scatter", .repeats = 10, .visits = 2, .visit = 0.002},
+    {.name = "three repeats", .locations = 15, .repeats = 3, .sessions = 6},
+    {.name = "one visit, OT in all six", .repeats = 10, .sessions = 6, .visits = 1, .anchor = true},
+    {.name = "two sessions that differ", .repeats = 10, .sessions = 2, .visits = 2, .session = 0.006},
+    {.name = "calibration's own zero", .tares = 0},
+    {.name = "instruments declared", .tachometer_rpm = 7.5, .thermometer_K = 0.5},
+    {.name = "ordinary gauge", .gauge_N = 0.02, .reading_V = 0.002},
+    {.name = "coarse gauge", .gauge_N = 0.1},
+    {.name = "locations scatter unevenly", .repeats = 10, .uneven_scatter = true},
+    {.name = "random walk of the zero", .tares = 3, .wander_V = 0.01},
+    {.name = "drift of the zero", .drift_V = 0.02},
+    {.name = "four sessions", .sessions = 4},
+    {.name = "the thesis's size",
+     .locations = 42,
+     .repeats = 10,
+     .sessions = 14,
+     .visits = 2,
+     .campaigns = 100}};
+
+/// All scenarios, on as many threads as there are processors, each with a seed of its own.
+std::vector<Ratios> measure_all(std::uint64_t seed) {
+  std::vector<Ratios> all(kScenarios.size());
+  std::atomic<std::size_t> next = 0;
+  std::vector<std::future<void>> workers;
+  for (unsigned worker = 0; worker < std::max(1U, std::thread::hardware_concurrency()); ++worker) {
+    workers.push_back(std::async(std::launch::async, [&] {
+      for (std::size_t i = next++; i < all.size(); i = next++)
+        all[i] = ratios_of(kScenarios[i], seed + 1000003 * (i + 1));
+    }));
+  }
+  for (std::future<void>& worker : workers) worker.get();
+  return all;
+}
+
+/// The gates are there to see a U95 that is too small: that 0.85 of it would not pass them is measured on the
+/// same campaigns.
+TEST(U95, HoldsTheTruthInNinetyFivePercentAndLessOfItWouldNot) {
+  constexpr double kTooSmall = 0.85;
+  const std::uint64_t seed = test::seed();
+  SCOPED_TRACE(seed);
+  const std::vector<Ratios> all = measure_all(seed);
+  std::vector<Held> c_t, u, small_c_t, small_u;
+  int small_pass = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    c_t.push_back(held(all[i].c_t, 1));
+    u.push_back(held(all[i].u, 1));
+    small_c_t.push_back(held(all[i].c_t, kTooSmall));
+    small_u.push_back(held(all[i].u, kTooSmall));
+    std::printf("%-28s C_T %.2f ± %.2f %%, U %.2f ± %.2f %%\n", kScenarios[i].name, 100 * c_t[i].rate,
+                100 * c_t[i].error, 100 * u[i].rate, 100 * u[i].error);
+    EXPECT_TRUE(passes(c_t[i]) && passes(u[i])) << kScenarios[i].name;
+    small_pass += passes(small_c_t[i]) ? 1 : 0;
+  }
+  const auto print = [](const char* name, const Held& of_c_t, const Held& of_u) {
+    std::printf("%-28s C_T %.2f ± %.2f %%, U %.2f ± %.2f %%\n", name, 100 * of_c_t.rate, 100 * of_c_t.error,
+                100 * of_u.rate, 100 * of_u.error);
+  };
+  print("all", mean_of(c_t), mean_of(u));
+  print("all, were U95 0.85 of itself", mean_of(small_c_t), mean_of(small_u));
+  EXPECT_TRUE(passes_together(mean_of(c_t)) && passes_together(mean_of(u)));
+  EXPECT_FALSE(passes_together(mean_of(small_c_t)));
+  EXPECT_FALSE(passes_together(mean_of(small_u)));
+  std::printf("of %zu scenarios %d would pass alone\n", all.size(), small_pass);
+  EXPECT_LE(small_pass, static_cast<int>(all.size()) * 2 / 3);
+}
 
 }  // namespace
 }  // namespace tunnelrig

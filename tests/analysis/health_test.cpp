@@ -86,6 +86,22 @@ TEST_F(Health, MissingTemperatureAndOffSpeed) {
   EXPECT_THAT(found(Severity::kNote), HasSubstr("R2 (4900)"));
 }
 
+TEST_F(Health, APressureFarFromTheModelsIsNoted) {
+  import();
+  calibrate_file();
+  EXPECT_THAT(found(Severity::kNote), testing::Not(HasSubstr("pressure: ")));
+  const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+  CampaignData data = read_campaign_data(file);
+  for (tunnelrig::Run& run : data.runs) run.numbers["air_pressure_Pa"] = 95000;
+  std::string said;
+  for (const Finding& finding : examine(file, data, {}))
+    if (finding.check == "pressure") said += finding.found + finding.advice;
+  EXPECT_THAT(said,
+              HasSubstr("taken for 101325 Pa by the thesis's model; as recorded (95000 Pa on average) it "
+                        "makes C_T 6.66 % greater"));
+  EXPECT_THAT(said, HasSubstr("`reduce --with air_pressure`"));
+}
+
 /// What is said of R1, of so many frames at 1333 Hz and 5000 rev/min, where its channels show these lines.
 std::string speeds_said(const CampaignFile& file, std::uint64_t frames, const std::vector<double>& lines_hz) {
   CampaignData data = read_campaign_data(file);

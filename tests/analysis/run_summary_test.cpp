@@ -1,6 +1,7 @@
 #include "analysis/run_summary.h"
 
 #include "analysis/autocorrelation.h"
+#include "calibration/distributions.h"
 #include "support/example_campaign.h"
 #include "support/seeds.h"
 
@@ -182,6 +183,40 @@ TEST(RunSummary, AShortRunOfNoiseDoesNotDrift) {
     EXPECT_EQ(drifts, 0) << blocks;
     EXPECT_NEAR(beyond_95, 0.045 * kRuns, 0.015 * kRuns) << blocks;
     EXPECT_EQ(seen, kRuns) << blocks;
+  }
+}
+
+/// Windows of 0.25 s of a run of 60 s, of noise that lasts so long.
+std::vector<double> slow_noise(double lasts_s, std::mt19937_64& engine) {
+  std::normal_distribution<double> unit;
+  const double decay = std::exp(-0.25 / lasts_s);
+  std::vector<double> series(240);
+  double value = unit(engine);
+  for (double& each : series) each = value = decay * value + std::sqrt(1 - decay * decay) * unit(engine);
+  return series;
+}
+
+/// Of noise that lasts a sixth of the run the standard error alone, taken for well known, held 71 %.
+TEST(RunSummary, AMeanInSlowNoiseIsKnownToFewDegreesOfFreedom) {
+  constexpr int kRuns = 1500;
+  std::mt19937_64 engine(12);
+  for (const auto& [lasts_s, at_least] : {std::pair{0.2, 0.93}, {1.0, 0.93}, {3.0, 0.91}, {10.0, 0.85}}) {
+    int held = 0, alone = 0, drifts = 0;
+    for (int run = 0; run < kRuns; ++run) {
+      const std::vector<double> series = slow_noise(lasts_s, engine);
+      double mean = 0;
+      for (const double value : series) mean += value / static_cast<double>(series.size());
+      const MeanKnowledge known = knowledge_of_mean(series);
+      held += std::abs(mean) <= half_width_95(std::sqrt(known.variance), known.dof) ? 1 : 0;
+      alone += std::abs(mean) <= 1.96 * std::sqrt(variance_of_mean(series)) ? 1 : 0;
+      drifts += std::abs(trend_of(series).z) > 4.5 ? 1 : 0;
+    }
+    std::printf(
+        "noise of %4.1f s: held in %.3f, by the standard error alone in %.3f; flagged as a drift %.4f\n",
+        lasts_s, held / double{kRuns}, alone / double{kRuns}, drifts / double{kRuns});
+    EXPECT_GT(held, at_least * kRuns) << lasts_s;
+    EXPECT_LT(held, 0.975 * kRuns) << lasts_s;
+    EXPECT_LT(drifts, 0.01 * kRuns) << lasts_s;
   }
 }
 

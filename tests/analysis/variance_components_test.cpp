@@ -149,6 +149,69 @@ INSTANTIATE_TEST_SUITE_P(
       return fmt::format("{}LocationsOneWithScatterTimes{:g}", noisy.param.locations, noisy.param.factor);
     });
 
+struct FewSessions {
+  const char* name = "";
+  std::size_t locations = 12, sessions = 6, per_visit = 10;
+  std::size_t visits = 1;  // of every location but the first, which sees all sessions
+  double session = 0.15;   // beside 0.25 of a run
+  double at_least = 0.93;
+  double u95_at_most = 0;  // median over the locations of one visit or few
+};
+
+class SessionsThatFewVisitsShow : public testing::TestWithParam<FewSessions> {};
+
+/// Where only few degrees of freedom tell what sessions scatter, U95 holds the truth and says something.
+TEST_P(SessionsThatFewVisitsShow, HaveIntervalsThatHoldAndAreNotTooWide) {
+  const FewSessions& design = GetParam();
+  const std::uint64_t seed = test::seed();
+  SCOPED_TRACE(seed);
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<double> unit;
+  constexpr int kCampaigns = 200;
+  double held = 0;
+  std::vector<double> u95s;
+  for (int i = 0; i < kCampaigns; ++i) {
+    GroupedRuns runs;
+    std::vector<double> offset(design.sessions);
+    for (double& value : offset) value = design.session * unit(engine);
+    for (std::size_t l = 0; l < design.locations; ++l) {
+      const std::size_t visits = l == 0 ? design.sessions : design.visits;
+      for (std::size_t r = 0; r < visits * (l == 0 ? 2 : design.per_visit); ++r) {
+        runs.location.push_back(l);
+        runs.session.push_back((l + r % visits) % design.sessions);
+        runs.value.push_back(offset[runs.session.back()] + 0.25 * unit(engine));
+      }
+    }
+    const LocationMeans means = location_means(runs, fit_variance_components(runs));
+    for (std::size_t l = 0; l < design.locations; ++l) {
+      const auto row = static_cast<Eigen::Index>(l);
+      const double u95 = half_width_95(std::sqrt(means.covariance(row, row)), means.dof[l]);
+      held += std::abs(means.mean[l]) <= u95 ? 1.0 / kCampaigns / static_cast<double>(design.locations) : 0;
+      if (l > 0) u95s.push_back(u95);
+    }
+  }
+  std::ranges::sort(u95s);
+  std::printf("%s: held in %.3f, median U95 %.2f\n", design.name, held, u95s[u95s.size() / 2]);
+  EXPECT_GT(held, design.at_least);
+  EXPECT_LT(u95s[u95s.size() / 2], design.u95_at_most);
+}
+
+// A known scatter would give 0.33 and 0.36 in the first and last; by its estimate's variance alone U95 is 1.2
+// in the first, three times as much, and the second's holds in 0.87.
+INSTANTIATE_TEST_SUITE_P(
+    Designs, SessionsThatFewVisitsShow,
+    testing::Values(FewSessions{.name = "AnAnchorInSixSessions", .u95_at_most = 0.6},
+                    FewSessions{.name = "TwoSessionsThatDiffer",
+                                .sessions = 2,
+                                .per_visit = 5,
+                                .visits = 2,
+                                .session = 0.6,
+                                .at_least = 0.9,
+                                .u95_at_most = 6},
+                    FewSessions{
+                        .name = "TwoVisitsOfSixSessions", .per_visit = 5, .visits = 2, .u95_at_most = 0.36}),
+    [](const auto& design) { return std::string(design.param.name); });
+
 /// ½ tr(P V_k P V_l), written out with a matrix of visits times visits.
 TEST(VarianceComponents, TheirCovarianceIsTheInverseInformation) {
   std::mt19937_64 engine(7);

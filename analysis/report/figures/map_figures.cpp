@@ -1,4 +1,5 @@
 #include "analysis/maps/contours.h"
+#include "analysis/maps/measured_region.h"
 #include "analysis/maps/picture.h"
 #include "analysis/report/figures/figures.h"
 
@@ -13,6 +14,8 @@ namespace {
 // the measured to the mirrored half.
 constexpr int kPrintedNodes = 241;
 constexpr int kPrintedLevels = 9, kPrintedUncertaintyLevels = 4;
+
+constexpr double kHatchingApart = 0.07;
 
 constexpr double kLeft_mm = 14.2, kBottom_mm = 10, kTop_mm = 3;  // around the field
 
@@ -73,9 +76,11 @@ void add_layer(const Material& material, const FittedField& field, const FitSumm
                   .geometry = maps.input.geometry};
   for (const LocationEstimate& location : maps.input.locations)
     picture.locations.push_back({location.y_norm, location.z_norm});
+  picture.hatching = hatching(MeasuredRegion(picture.locations), kHatchingApart);
   const std::string shared = fmt::format(
       " across the tunnel, in per cent, against ȳ = 2y/(w_t − w_q) and z̄ = 2z/(h_t − h_q). "
-      "Crosses: the {} measured locations; dashed lines, if any: mirror image of the measured half.",
+      "Crosses: the {} measured locations; dashed lines, if any: mirror image of the measured half; "
+      "hatched: beyond the locations, where U95 supposes that the field goes on as it is.",
       picture.locations.size());
   figures.drawn.push_back(drawn_map(
       picture, texts.name,

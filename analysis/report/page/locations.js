@@ -127,6 +127,14 @@ function locationFigure(title, quantity, tells) {
 const locationsSection = () => locationFigure(
     'C_T against height', 'c_t',
     `C_T is of all rotors together, over ½ρΩ²R² and ${report.sections.locations.area}.`);
+/** What of U is the rig's and not the tunnel's, where a map tells. */
+function offsetInU() {
+  const offset = report.sections.maps.uneven_thrust?.offset;
+  return offset && `The rig’s own offset of ${withU95(...offset, true)} % is in it, and taken out of the map.`;
+}
+
 const unevenSection = () => locationFigure(
     'U against height', 'u_percent',
-    'U is the thrust of the right pair minus that of the left, over all four; negative rolls to the right.');
+    sentences(
+        'U is the thrust of the right pair minus that of the left, over all four; negative rolls to the right.',
+        offsetInU()));

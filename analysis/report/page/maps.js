@@ -134,6 +134,17 @@ function heat(maps, layer, width) {
   };
 }
 
+/** Hatching over what lies beyond the measured locations. */
+const hatching = ({beyond: {y_norm: x, z_norm: y}}) => ({
+  type: 'scatter',
+  mode: 'lines',
+  x,
+  y,
+  line: {color: '#707070', width: 0.8},
+  showlegend: false,
+  hoverinfo: 'skip',
+});
+
 /** The measured locations as crosses with a white edge, which say on hover what was measured. */
 function crosses(maps, field) {
   const common = {
@@ -189,6 +200,7 @@ function drawMap(maps, field, layerName, width) {
   return {
     data: [
       heat(maps, layer, width),
+      hatching(maps),
       lines(maps, layer, 0, middle + 1, dash(-1)),
       lines(maps, layer, middle, last, dash(1)),
       ...crosses(maps, field),
@@ -234,6 +246,8 @@ function mapFigure(maps, field) {
   const caption = sentences(
       tells, offsetOf(maps[field]), `Crosses: the ${maps.locations.length} measured locations.`,
       mirrored && 'Dashed lines: the mirror image of the measured half.',
+      `Hatched: the ${fixed(maps.beyond.percent, 0)} % of the square beyond the locations and their mirror images,`,
+      'where the map goes on as it is, which walls, ground and ceiling need not: U95 there is too small more often.',
       'U95, the half width of the 95 % interval, comes from the covariance of the locations (repeats, sessions,',
       `and what they share) and from the field in between (${maps.method.replaceAll('-', ' ')}).`,
       fitOf(maps[field]));

@@ -39,7 +39,10 @@ function unevenThrust({greatest_uneven_percent: uneven}) {
   if (!uneven) return '';
   const side = uneven.value < 0 ? 'right' : 'left';
   const value = `${percent(uneven)}, the ${side} pair lifting less`;
-  return `The uneven thrust U is largest at ${place(uneven)}: ${value}.`;
+  const offset = known(uneven.offset) && percent({value: uneven.offset, u95: uneven.offset_u95});
+  return offset ?
+      `Less the rig’s own offset of ${offset}, the uneven thrust U is largest at ${place(uneven)}: ${value}.` :
+      `The uneven thrust U as measured, the rig’s own offset included, is largest at ${place(uneven)}: ${value}.`;
 }
 
 /** What the model in force corrects for, and what that gained. */
@@ -84,6 +87,12 @@ function verdict({calibration_passed: passed}) {
   return `The calibration ${passed ? 'passed all its gates' : 'did not pass all its gates'}.`;
 }
 
+function whatPlusMinusIs({u95_without: without}) {
+  if (!without.length) return 'Every ± on this page is U95, which holds the value with 95 % probability.';
+  return `Every ± on this page is U95 without the scatter between ${without.join(' and ')}, which no location ` +
+      'shows: it holds the value with less than 95 % probability.';
+}
+
 function summaryText(summary) {
   const places = {OT: 'in the middle of the tunnel (OT)', OS: 'in open space (OS)'};
   const c_t = (summary.c_t ?? []).map((v) => `${withU95(v.value, v.u95)} ${places[v.location]}`);
@@ -94,7 +103,7 @@ function summaryText(summary) {
       runs, reduced ? `${coefficients()} give coefficients.` : 'none gives coefficients yet.',
       c_t.length && `C_T is ${c_t.join(' and ')}.`, changeOfThrust(summary), unevenThrust(summary),
       modelInForce(summary), bestController(summary), losses(summary), verdict(summary), ...summary.missing,
-      reduced && 'Every ± on this page is U95, which holds the value with 95 % probability.');
+      reduced && whatPlusMinusIs(summary));
 }
 
 function headOfCampaign() {

@@ -1,3 +1,4 @@
+#include "analysis/maps/measured_region.h"
 #include "analysis/maps/tunnel_maps.h"
 #include "published_input.h"
 #include "support/seeds.h"
@@ -6,6 +7,9 @@
 #include <cmath>
 #include <cstdio>
 #include <random>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -56,6 +60,61 @@ TEST(Coverage, OfTheGaussianProcessIsNearNominal) {
       // (docs/maps.md).
       EXPECT_GT(measured.delta_ct, 0.93);
       EXPECT_GT(measured.uneven_thrust, 0.85);
+    }
+  }
+}
+
+/// Shares of points inside the locations' hull and beyond it where a 95 % interval holds the true value.
+struct Extrapolated {
+  std::array<Coverage, 2> of;
+  double beyond = 0;  // share of the square
+};
+
+Extrapolated extrapolated(std::uint64_t seed, const std::vector<std::string>& labels, MapMethod method) {
+  constexpr int kFew = 14, kPointsOfEach = 400;
+  std::mt19937_64 engine(seed);
+  std::uniform_real_distribution<double> anywhere(-1, 1);
+  Extrapolated result;
+  std::array<double, 2> points = {0, 0};
+  for (std::uint64_t campaign = 0; campaign < kFew; ++campaign) {
+    const MapInput input = test::only(test::published_input(seed + campaign), labels);
+    const TunnelMaps maps = fit_maps(input, {.method = method});
+    const MeasuredRegion region = measured_region({.locations = measured_locations(maps.input)});
+    result.beyond = region.share_outside();
+    for (int i = 0; i < kPointsOfEach; ++i) {
+      const TunnelPoint point{anywhere(engine), anywhere(engine)};
+      const std::size_t where = region.holds(point) ? 0 : 1;
+      const FieldEstimate delta_ct = estimate_at(maps.delta_ct, point),
+                          uneven = estimate_at(maps.uneven_thrust, point);
+      points[where] += 1;
+      result.of[where].delta_ct +=
+          std::abs(delta_ct.value - test::true_delta_ct_percent(point)) < delta_ct.u95() ? 1 : 0;
+      result.of[where].uneven_thrust +=
+          std::abs(uneven.value - test::true_uneven_thrust_percent(point)) < uneven.u95() ? 1 : 0;
+    }
+  }
+  for (std::size_t where = 0; where < 2; ++where) {
+    result.of[where].delta_ct /= points[where];
+    result.of[where].uneven_thrust /= points[where];
+  }
+  return result;
+}
+
+/// Why pictures hatch what lies beyond the locations: U95 does not hold there what it says.
+TEST(Coverage, IsLessWhereTheMapExtrapolates) {
+  const std::uint64_t seed = test::seed();
+  std::vector<std::string> nine, to_h3;
+  for (const char* column : {"H0", "H2", "H4"})
+    for (const char* row : {"V2", "V0", "V-2"}) nine.push_back(canonical_location(std::string(column) + row));
+  for (const std::string& label : tunnel_grid())
+    if (grid_point(label)->y_norm < 0.7) to_h3.push_back(label);
+  for (const auto& [name, labels] : {std::pair{"9 locations", nine}, {"28 locations (H0 to H3)", to_h3}}) {
+    for (const MapMethod method : test::kMethods) {
+      const Extrapolated shares = extrapolated(seed, labels, method);
+      std::printf("%s, %s, %.0f %% beyond: inside %.2f / %.2f, beyond %.2f / %.2f\n", name,
+                  name_of(method).c_str(), 100 * shares.beyond, shares.of[0].delta_ct,
+                  shares.of[0].uneven_thrust, shares.of[1].delta_ct, shares.of[1].uneven_thrust);
+      EXPECT_LT(shares.of[1].both(), shares.of[0].both() - 0.03);
     }
   }
 }

@@ -104,6 +104,25 @@ TEST_P(OffsetOfTheRig, CountsWithWhatAllLocationsAreDeclaredToShare) {
     EXPECT_LT(estimate_at(maps.uneven_thrust, point).standard_uncertainty, 0.4);
 }
 
+/// What the report ranks. The reduction's own U95 would be that of U with the offset and all that is shared.
+TEST_P(OffsetOfTheRig, TakenOffTheMeasuredValuesLeavesTheFieldToItsU95) {
+  constexpr int kCampaigns = 40;
+  int held = 0, locations = 0;
+  for (std::uint64_t seed = 1; seed <= kCampaigns; ++seed) {
+    const MapInput input = with_offset(published_input(seed, {.shared_u_percent = 0.5}), 2.5);
+    for (const MeasuredField& measured : measured_field(fit(input).uneven_thrust)) {
+      const double error = measured.field.value - test::true_uneven_thrust_percent(measured.point);
+      held += std::abs(error) <= measured.field.u95();
+      EXPECT_LT(measured.field.u95(), 0.3) << "0.1 of its own; what all share is in the offset";
+      EXPECT_GT(measured.point.y_norm, 0);
+      ++locations;
+    }
+  }
+  EXPECT_EQ(locations, 35 * kCampaigns);
+  EXPECT_GT(held, 0.93 * locations);
+  EXPECT_LT(held, 0.97 * locations);
+}
+
 TEST_P(OffsetOfTheRig, IsNoPartOfTheChangeOfThrust) {
   EXPECT_FALSE(offset_of(fit(published_input(1)).delta_ct));
 }

@@ -54,6 +54,7 @@ std::vector<Place> places(const CampaignParts& parts) {
     }
   }
   if (!parts.odd_label.empty()) all.push_back({parts.odd_label, {}, thesis::kCtOpenSpace, 0});
+  for (Place& place : all) place.uneven += parts.uneven_offset_percent / 100;
   return all;
 }
 

@@ -11,17 +11,18 @@ namespace tunnelrig::test {
 
 /// What a campaign of these tests has: everything, unless a test takes something away.
 struct CampaignParts {
-  bool raw_data = true;       // else the rows give thrusts
-  bool calibrated = true;     // where there are raw data
-  bool tunnel = true;         // else every location is in open space
-  bool open_space = true;     // OS, and both planes
-  bool tares = true;          // where there are raw data
-  int rotors = 4;             // fewer only without raw data
-  int columns = 3, rows = 5;  // of the tunnel's locations
-  std::string source;         // the runs' column `source`; empty: they have none
-  std::string odd_label;      // of one more location, without a place in the tunnel
-  int frames_lost = 0;        // of the first run
-  int repeats = 2;            // a session each
+  bool raw_data = true;              // else the rows give thrusts
+  bool calibrated = true;            // where there are raw data
+  bool tunnel = true;                // else every location is in open space
+  bool open_space = true;            // OS, and both planes
+  bool tares = true;                 // where there are raw data
+  int rotors = 4;                    // fewer only without raw data
+  int columns = 3, rows = 5;         // of the tunnel's locations
+  std::string source;                // the runs' column `source`; empty: they have none
+  std::string odd_label;             // of one more location, without a place in the tunnel
+  int frames_lost = 0;               // of the first run
+  int repeats = 2;                   // a session each
+  double uneven_offset_percent = 0;  // of the rig, in U everywhere
 };
 
 /// Writes a campaign of the thesis's field as a folder beside `db` and imports it. Seeded: the same each
