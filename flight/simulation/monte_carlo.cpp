@@ -69,8 +69,7 @@ class Worker {
     setup_.air.wind_m_s += hidden.wind_m_s;
     setup_.air.gust_m_s = std::hypot(setup_.air.gust_m_s, hidden.gust_m_s);
     if (task_.map == nullptr) return;
-    const double thrust_error = spread.map_errors * random.normal(),
-                 uneven_error = spread.map_errors * random.normal();
+    const MapError thrust_error(spread.map_errors, random), uneven_error(spread.map_errors, random);
     if (spread.map_errors == 0 && hidden.map_scale == 1) {
       setup_.field = map_;
       return;

@@ -32,7 +32,7 @@ struct Spread {
   double mass = 0.01,
          rotor_thrust = 0.01;  // relative; every rotor its own, after the thesis's sorting of propellers
   double roll_error_rad = 0.0035, accelerometer_bias_m_s2 = 0.02;
-  double map_errors = 1;  // of the map's standard uncertainty, one draw for each layer
+  double map_errors = 1;  // of the map's standard uncertainty; a MapError for each layer
 
   static Spread none() { return {0, 0, 0, 0, 0}; }
 };
