@@ -149,6 +149,17 @@ DisturbanceField field_of(const FlightTask& task) {
 
 }  // namespace
 
+std::optional<MeanInterval> paired_difference(const Comparison& one, const Comparison& other) {
+  if (!one.has_interval() || !other.has_interval() || one.runs.size() != other.runs.size()) return {};
+  const auto n = static_cast<double>(one.runs.size());
+  const auto difference_m = [&](std::size_t i) { return one.runs[i].rms_m() - other.runs[i].rms_m(); };
+  double mean = 0, squares = 0;
+  for (std::size_t i = 0; i < one.runs.size(); ++i) mean += difference_m(i) / n;
+  for (std::size_t i = 0; i < one.runs.size(); ++i) squares += std::pow(difference_m(i) - mean, 2);
+  const double half = student_975(static_cast<int>(n) - 1) * std::sqrt(squares / (n - 1) / n);
+  return MeanInterval{mean - half, mean + half};
+}
+
 double RunResult::rms_m() const { return std::hypot(rms_y_m, rms_z_m); }
 
 void HiddenTruth::validate() const {

@@ -81,6 +81,16 @@ struct Comparison {
   double rejected_share = 0;              // of the matches
 };
 
+/// Of a mean over runs, 95 %, Student's t.
+struct MeanInterval {
+  double low_m = 0, high_m = 0;
+};
+
+/// What `one` errs more than `other` in the same run. Of the same task both fly the same vehicles, sensors'
+/// errors and air, which drop out here and are most of what Comparison's own intervals consist of. Nothing
+/// where a flight was lost, or of a single run.
+std::optional<MeanInterval> paired_difference(const Comparison& one, const Comparison& other);
+
 /// `progress` is called from one thread at a time with the number of finished runs (of all processes, as if
 /// they were equally fast). With several processes all of them must call this, with the same task; all get
 /// the whole result.
