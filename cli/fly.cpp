@@ -23,7 +23,7 @@ namespace {
 struct FlyOptions {
   std::string map, tunnel, scenario = "circle", gains, json, out, tune, position = "lidar";
   std::vector<std::string> controllers;
-  int runs = 20, workers = 0, budget = 300;
+  int runs = 20, workers = 0, budget = TuningSettings{}.budget;
   std::uint64_t seed = 1;
   double lidar_sigma_mm = 10;
   std::vector<double> blind_s;  // from, to
