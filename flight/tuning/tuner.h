@@ -10,8 +10,8 @@
 namespace tunnelrig {
 
 struct TuningSettings {
-  int budget = 1000;  // evaluations per controller; with 300 the cascades are not at their end
-  int runs = 2;      // flights of either scenario in an evaluation, the same ones in every evaluation
+  int budget = 1000;  // evaluations per controller; the cascades are not at their end with 300
+  int runs = 2;       // flights of either scenario in an evaluation, the same ones in every evaluation
   int workers = 0;
   std::uint64_t seed = 20260301;  // of flights and optimiser; comparisons use others
   double effort_m_per_N = 0.003;  // rms thrust that moves a rotor about its mean counts as so much error
