@@ -57,6 +57,11 @@ TEST(DisturbanceField, IsMirroredToTheLastBitAndHeldOutside) {
 /// direction, which would be a constant force that any integral removes.
 TEST(DisturbanceField, IsWrongByItsUncertaintyInPlacesOfBothSigns) {
   DisturbanceMap map = published_disturbance_map();
+  map.grid = {};
+  for (int i = -4; i <= 4; ++i) {  // hundreds of finer ones would take seconds
+    map.grid.y_norm.push_back(0.25 * i);
+    map.grid.z_norm.push_back(0.25 * i);
+  }
   for (MapLayer* layer : {&map.delta_ct, &map.uneven_thrust}) {
     layer->value_percent.assign(map.grid.nodes(), 0);
     layer->u95_percent.assign(map.grid.nodes(), map.coverage_factor);
