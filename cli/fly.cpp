@@ -23,9 +23,10 @@ namespace {
 struct FlyOptions {
   std::string map, tunnel, scenario = "circle", gains, json, out, tune, position = "lidar";
   std::vector<std::string> controllers;
-  int runs = 20, workers = 0, budget = 300;
+  int runs = 20, workers = 0, budget = TuningSettings{}.budget;
   std::uint64_t seed = 1;
   double lidar_sigma_mm = 10;
+  std::vector<double> blind_s;  // from, to
   HiddenTruth hidden;
 };
 
@@ -122,6 +123,10 @@ FlownScenario fly_scenario(const FlyOptions& options, const PlaceAndPath& one, c
   } else {
     task.localisation->lidar.range_sigma_m = 1e-3 * options.lidar_sigma_mm;
     if (options.position == "lidar-thesis") task.localisation->filter = FlightFilter::thesis;
+    if (!options.blind_s.empty()) {
+      task.localisation->blind_from_s = options.blind_s[0];
+      task.localisation->blind_to_s = options.blind_s[1];
+    }
   }
   FlownScenario flown{.tunnel = space.tunnel.name,
                       .scenario = scenario.name,
@@ -177,14 +182,14 @@ void refuse_unused(const FlyOptions& options, const CLI::App& verb) {
   if (!options.tune.empty())
     refuse_given(verb,
                  {"--json", "--out", "--gains", "--scenario", "--tunnel", "--runs", "--seed", "--position",
-                  "--lidar-sigma-mm", "--payload-kg", "--map-scale", "--wind-m-s", "--gust-m-s",
+                  "--lidar-sigma-mm", "--blind-s", "--payload-kg", "--map-scale", "--wind-m-s", "--gust-m-s",
                   "--motor-loss", "--weak-rotor"},
                  "does not go with --tune, which flies the same flights whatever is said of them, and writes "
                  "gains alone; fly with --gains afterwards");
   else
     refuse_given(verb, {"--budget"}, "is of tuning; it goes with --tune");
   if (options.position == "given")
-    refuse_given(verb, {"--lidar-sigma-mm"}, "with --position given there is no LIDAR");
+    refuse_given(verb, {"--lidar-sigma-mm", "--blind-s"}, "with --position given there is no LIDAR");
   if (verb.count("--motor-loss") == 0)
     refuse_given(verb, {"--weak-rotor"}, "says which rotor lost thrust; --motor-loss says how much");
 }
@@ -228,6 +233,9 @@ int run_fly(const FlyOptions& given, const CLI::App& verb) {
                      options.hidden.weak_rotor));
   if (options.position != "lidar" && options.position != "lidar-thesis" && options.position != "given")
     throw InputError(fmt::format("--position {}: must be lidar, lidar-thesis or given", options.position));
+  if (!options.blind_s.empty() && !(options.blind_s[0] >= 0 && options.blind_s[1] > options.blind_s[0]))
+    throw InputError(fmt::format("--blind-s {:g},{:g}: must be two times, the second one later",
+                                 options.blind_s[0], options.blind_s[1]));
   check_places(options);
   refuse_unused(options, verb);
   if (!options.tune.empty()) return tune_all(options);
@@ -290,6 +298,9 @@ void add_fly(CLI::App& app, Work& work) {
   verb->add_option("--lidar-sigma-mm", options->lidar_sigma_mm, "Range noise of the LIDAR")
       ->check(CLI::Range(0.0, 500.0))
       ->capture_default_str();
+  verb->add_option("--blind-s", options->blind_s, "FROM,TO: the LIDAR sees nothing meanwhile")
+      ->delimiter(',')
+      ->expected(2);
   verb->add_option("--gains", options->gains, "File of gains; the frozen ones otherwise");
   verb->add_option("--json", options->json, "Write the comparison to this file");
   verb->add_option("--out", options->out,

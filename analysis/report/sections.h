@@ -86,9 +86,9 @@ Json documents_section(const CampaignFile& file);
 /// file.
 Json flights_section(const std::string& path);
 
-/// The controller with the fewest contacts and, among those, the smallest error, over all scenarios of such a
-/// section; null where no controller flew them all. With one scenario also its 95 % interval, and the
-/// controllers that the runs cannot tell from it.
+/// The controller with the smallest error of those whose contacts cannot be told from the fewest, over all
+/// scenarios of such a section; null where no controller flew them all. With one scenario also its 95 %
+/// interval, and the controllers that the runs cannot tell from it.
 Json best_controller(const Json& section);
 
 Json table_section(const ObservationTable& table, const TableReduction& reduction);

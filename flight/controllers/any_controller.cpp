@@ -17,8 +17,8 @@ namespace {
 constexpr std::array<ControllerKind, 11> kKinds = {{
     {"ibs", "integral backstepping as printed, (6.29) and (6.30)"},
     {"ibs-lyapunov", "integral backstepping with a1 = 1 + k1 + k2 k3"},
-    {"pid", "ArduCopter's position cascade without velocity feed-forward"},
-    {"pid-ff", "ArduCopter's position cascade with velocity feed-forward"},
+    {"pid", "ArduCopter's position cascade without feed-forward"},
+    {"pid-ff", "ArduCopter's position cascade with its feed-forward of velocity and acceleration"},
     {"pid-single", "the thesis's lateral PID (6.16) with ArduCopter's altitude hold"},
     {"ibs-map", "ibs-lyapunov with the measured map fed forward"},
     {"ibs-do", "backstepping with a disturbance observer"},

@@ -9,8 +9,9 @@ double AltitudeCascade::step(const ControlInput& in, double per_step_Hz) {
                  -gains_.sink_limit_m_s, gains_.climb_limit_m_s);
   velocity_error_ += low_pass_share(gains_.velocity_filter_Hz, in.step_s) *
                      (velocity - in.velocity_m_s[1] - velocity_error_);
-  const double acceleration = std::clamp(gains_.velocity_p * velocity_error_, -gains_.acceleration_limit_m_s2,
-                                         gains_.acceleration_limit_m_s2);
+  const double acceleration = std::clamp(
+      gains_.velocity_p * velocity_error_ + (feed_forward_ ? in.reference.acceleration_m_s2[1] : 0),
+      -gains_.acceleration_limit_m_s2, gains_.acceleration_limit_m_s2);
   const double previous = error_;
   error_ += low_pass_share(gains_.acceleration_filter_Hz, in.step_s) *
             (acceleration - in.acceleration_m_s2[1] - error_);
@@ -38,7 +39,8 @@ ControlOutput PidCascade::step(const ControlInput& in) {
   integral_ = std::clamp(integral_ + lateral_.velocity_i * error_ * in.step_s, -lateral_.integral_limit_m_s2,
                          lateral_.integral_limit_m_s2);
   const double acceleration =
-      std::clamp(lateral_.velocity_p * error_ + integral_ + lateral_.velocity_d * derivative_,
+      std::clamp(lateral_.velocity_p * error_ + integral_ + lateral_.velocity_d * derivative_ +
+                     (feed_forward_ ? in.reference.acceleration_m_s2[0] : 0),
                  -lateral_.acceleration_limit_m_s2, lateral_.acceleration_limit_m_s2);
   return {
       std::clamp(altitude_.step(in, per_step_Hz), limits_.lowest_thrust_m_s2, limits_.highest_thrust_m_s2),

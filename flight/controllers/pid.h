@@ -49,8 +49,10 @@ struct LateralGains {
   double integral_limit_m_s2 = 2;
 };
 
-/// ArduCopter's cascade on both axes; with `feed_forward` the reference's velocity is added to the position
-/// P's.
+/// ArduCopter's cascade on both axes. With `feed_forward` the reference's velocity is added to the position
+/// P's, and its acceleration to the velocity PID's, as AC_PosControl does with its desired velocity and
+/// acceleration: the other controllers know the reference's acceleration as well. The thesis's PID has
+/// neither.
 class PidCascade {
  public:
   PidCascade(const AltitudeGains& altitude, const LateralGains& lateral, double full_thrust_m_s2,

@@ -20,6 +20,7 @@ constexpr int kMost_steps = 8;
 constexpr double kConverged_m = 2e-4;
 constexpr double kSame_place_m = 0.1;
 constexpr double kChance_sigma = 3;  // of what neighbours share by chance
+constexpr double kPrior_sigma = 4;
 
 Projection narrowed(const Eigen::Matrix2d& m) {
   return {static_cast<float>(m(0, 0)), static_cast<float>(m(0, 1)), static_cast<float>(m(1, 0)),
@@ -103,11 +104,11 @@ struct ScanMatcher::Work {
 
   void project(const Pose& pose) { kernels.project(beams, narrowed(projection(pose))); }
 
-  SectionBox box(const std::optional<Eigen::Vector2d>& prior) const {
+  SectionBox box(const std::optional<SearchPrior>& prior) const {
     const SectionBox& all = section.box();
     if (!prior) return all;
-    const Eigen::Vector2d gate(settings.prior_gate_m, settings.prior_gate_m);
-    return {all.lowest.cwiseMax(*prior - gate), all.highest.cwiseMin(*prior + gate)};
+    const Eigen::Vector2d gate = (kPrior_sigma * prior->sigma_m).cwiseMax(settings.prior_gate_m);
+    return {all.lowest.cwiseMax(prior->position_m - gate), all.highest.cwiseMin(prior->position_m + gate)};
   }
 
   Found find(const SectionBox& where, double rotation_rad) {
@@ -365,11 +366,12 @@ Eigen::Vector2d ScanMatcher::moved_per_roll_m() const { return work_->moved_per_
 
 const MatcherSettings& ScanMatcher::settings() const { return work_->settings; }
 
-Match ScanMatcher::match(const Scan& scan, const Attitude& attitude,
-                         const std::optional<Eigen::Vector2d>& prior, const SweepMotion& motion) {
+Match ScanMatcher::match(const Scan& scan, const Attitude& attitude, const std::optional<SearchPrior>& prior,
+                         const SweepMotion& motion) {
   Work& work = *work_;
   work.take(scan, attitude, motion);
-  if (prior && !prior->allFinite()) throw InputError::in("scan", "its prior is not finite");
+  if (prior && !(prior->position_m.allFinite() && prior->sigma_m.allFinite()))
+    throw InputError::in("scan", "its prior is not finite");
   Fit fit;
   Rejection reason = Rejection::few_beams;
   if (work.returned >= static_cast<int>(work.settings.least_beams)) {

@@ -40,7 +40,7 @@ struct MatcherSettings {
   double gate_sigma = 4;         // then beyond so many standard deviations of those that did
   double most_slope = 12;        // 1 / cos(incidence): beams that graze a wall more say little of where it is
   double least_sigma_m = 0.003;  // of a range, whatever the scan's own residuals say
-  double prior_gate_m = 0.25;    // arg max within this of a prior, where one is given
+  double prior_gate_m = 0.25;    // arg max at least so far around a prior, where one is given
   double vantage_spread = 0.6;   // part of the section that the reference is seen from; 0: its origin alone
 
   // What is rejected.
@@ -77,6 +77,15 @@ struct SweepMotion {
   double roll_acceleration_rad_s2 = 0;
 };
 
+/// Where the LIDAR is believed to be, and how well that is known.
+struct SearchPrior {
+  Eigen::Vector2d position_m;
+  Eigen::Vector2d sigma_m;
+
+  SearchPrior(const Eigen::Vector2d& position, const Eigen::Vector2d& sigma = Eigen::Vector2d::Zero())
+      : position_m(position), sigma_m(sigma) {}
+};
+
 struct Match {
   Eigen::Vector2d position_m{0, 0};  // (y, z) of the LIDAR in the cross-section
   double rotation_rad = 0;  // what is to be added to the attitude's roll; 0 where it is taken as known
@@ -100,12 +109,12 @@ class ScanMatcher {
   ScanMatcher& operator=(ScanMatcher&&) noexcept;
 
   /// The attitude is the IMU's in the middle of the sweep, and the position is that of the same moment. A
-  /// prior narrows the search and is not otherwise used; with a motion every beam counts from where it was
-  /// measured. Throws InputError for an empty scan, one with another number of beams, NaN, an attitude or
-  /// motion that is not finite, or an attitude that turns the scan plane edge-on (over 75°); everything else
-  /// that is wrong with a scan is a rejection.
+  /// prior narrows the search, to four of its standard deviations or prior_gate_m, and is not otherwise used;
+  /// with a motion every beam counts from where it was measured. Throws InputError for an empty scan, one
+  /// with another number of beams, NaN, an attitude or motion that is not finite, or an attitude that turns
+  /// the scan plane edge-on (over 75°); everything else that is wrong with a scan is a rejection.
   Match match(const Scan& scan, const Attitude& attitude,
-              const std::optional<Eigen::Vector2d>& prior = std::nullopt, const SweepMotion& motion = {});
+              const std::optional<SearchPrior>& prior = std::nullopt, const SweepMotion& motion = {});
 
   /// Whether a scan at this attitude can be matched at all: its plane is within 75° of the cross-section.
   static bool can_match(const Attitude& attitude);

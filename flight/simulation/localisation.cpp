@@ -2,6 +2,8 @@
 
 #include "flight/simulation/flight_loop.h"
 
+#include <algorithm>
+
 #include <Eigen/LU>
 
 namespace tunnelrig {
@@ -41,7 +43,7 @@ void Localisation::start(const RigidState& truth) {
     filter_ = KalmanFilter(at, settings_.kinematic, settings_.gate, settings_.start);
   }
   cycle_ = nees_count_ = 0;
-  matches_ = rejected_ = 0;
+  matches_ = rejected_ = rejected_in_a_row_ = 0;
   nees_sum_ = 0;
   waiting_ = false;
 }
@@ -93,6 +95,9 @@ void Localisation::take_scan() {
     measured[i] = moment.measured;
   }
   scan_ = lidar_->sweep(path);
+  if (const double now_s = static_cast<double>(cycle_) * kControlStep_s;
+      now_s >= settings_.blind_from_s && now_s < settings_.blind_to_s)
+    std::fill(scan_.range_m.begin(), scan_.range_m.end(), 0.0F);
 
   const Attitude &first = measured.front(), &middle = measured[kPosesOfSweep / 2], &last = measured.back();
   scan_attitude_ = middle;
@@ -109,17 +114,31 @@ void Localisation::take_scan() {
 void Localisation::correct() {
   waiting_ = false;
   ++matches_;
-  if (!ScanMatcher::can_match(scan_attitude_)) {  // it is overturning, and may be lost before long
+  if (use_scan()) {
+    rejected_in_a_row_ = 0;
+  } else {
     ++rejected_;
-    return;
+    ++rejected_in_a_row_;
   }
-  const Match match = matcher_.match(scan_, scan_attitude_, kinematic_state().head<2>(), scan_motion_);
-  bool used = match.accepted;
-  if (used) {
-    const MeasuredPosition position = measured(match);
-    used = std::visit([&](auto& filter) { return filter.correct(position).accepted; }, filter_);
-  }
-  if (!used) ++rejected_;
+}
+
+bool Localisation::use_scan() {
+  if (!ScanMatcher::can_match(scan_attitude_))
+    return false;  // it is overturning, and may be lost before long
+  const Match match = matcher_.match(scan_, scan_attitude_, prior(), scan_motion_);
+  if (!match.accepted) return false;
+  const MeasuredPosition position = measured(match);
+  return std::visit([&](auto& filter) { return filter.correct(position).accepted; }, filter_);
+}
+
+/// Nothing after as many rejections in a row as make the filter doubt itself: around a place that is wrong no
+/// scan fits, so that none would ever reach the filter to put it right.
+std::optional<SearchPrior> Localisation::prior() const {
+  if (settings_.gate.most_rejections > 0 && rejected_in_a_row_ >= settings_.gate.most_rejections) return {};
+  const Eigen::Vector2d variance_m2 = std::visit(
+      [](const auto& filter) -> Eigen::Vector2d { return filter.covariance().diagonal().template head<2>(); },
+      filter_);
+  return SearchPrior(kinematic_state().head<2>(), variance_m2.cwiseMax(0).cwiseSqrt());
 }
 
 MeasuredPosition Localisation::measured(const Match& match) {

@@ -31,6 +31,7 @@ struct LocalisationSettings {
   /// Not the accelerometer's noise alone: the attitude's error, which this filter does not know of, leaves an
   /// acceleration of g times it, which the filter must be allowed to correct.
   KinematicModel kinematic = {.acceleration_variance_m2_s4 = 0.45};
+  double blind_from_s = 0, blind_to_s = 0;  // the LIDAR sees nothing meanwhile
 };
 
 /// Positions in the flight frame (z above the floor). `space` must outlive it.
@@ -57,6 +58,8 @@ class Localisation {
   Moment moment_ago(double ago_s) const;
   void take_scan();
   void correct();
+  bool use_scan();
+  std::optional<SearchPrior> prior() const;
   MeasuredPosition measured(const Match& match);
   Eigen::Vector4d kinematic_state() const;  // position and velocity
   void judge(const RigidState& truth);
@@ -73,7 +76,7 @@ class Localisation {
   std::array<Moment, kRemembered> moments_;
   long cycle_ = 0;
   bool waiting_ = false;
-  int matches_ = 0, rejected_ = 0;
+  int matches_ = 0, rejected_ = 0, rejected_in_a_row_ = 0;
   double nees_sum_ = 0;
   long nees_count_ = 0;
 };

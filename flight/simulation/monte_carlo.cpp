@@ -69,8 +69,7 @@ class Worker {
     setup_.air.wind_m_s += hidden.wind_m_s;
     setup_.air.gust_m_s = std::hypot(setup_.air.gust_m_s, hidden.gust_m_s);
     if (task_.map == nullptr) return;
-    const double thrust_error = spread.map_errors * random.normal(),
-                 uneven_error = spread.map_errors * random.normal();
+    const MapError thrust_error(spread.map_errors, random), uneven_error(spread.map_errors, random);
     if (spread.map_errors == 0 && hidden.map_scale == 1) {
       setup_.field = map_;
       return;
@@ -149,6 +148,17 @@ DisturbanceField field_of(const FlightTask& task) {
 }
 
 }  // namespace
+
+std::optional<MeanInterval> paired_difference(const Comparison& one, const Comparison& other) {
+  if (!one.has_interval() || !other.has_interval() || one.runs.size() != other.runs.size()) return {};
+  const auto n = static_cast<double>(one.runs.size());
+  const auto difference_m = [&](std::size_t i) { return one.runs[i].rms_m() - other.runs[i].rms_m(); };
+  double mean = 0, squares = 0;
+  for (std::size_t i = 0; i < one.runs.size(); ++i) mean += difference_m(i) / n;
+  for (std::size_t i = 0; i < one.runs.size(); ++i) squares += std::pow(difference_m(i) - mean, 2);
+  const double half = student_975(static_cast<int>(n) - 1) * std::sqrt(squares / (n - 1) / n);
+  return MeanInterval{mean - half, mean + half};
+}
 
 double RunResult::rms_m() const { return std::hypot(rms_y_m, rms_z_m); }
 

@@ -32,7 +32,7 @@ struct Spread {
   double mass = 0.01,
          rotor_thrust = 0.01;  // relative; every rotor its own, after the thesis's sorting of propellers
   double roll_error_rad = 0.0035, accelerometer_bias_m_s2 = 0.02;
-  double map_errors = 1;  // of the map's standard uncertainty, one draw for each layer
+  double map_errors = 1;  // of the map's standard uncertainty; a MapError for each layer
 
   static Spread none() { return {0, 0, 0, 0, 0}; }
 };
@@ -80,6 +80,16 @@ struct Comparison {
   double saturated_s = 0, clamped_s = 0;  // mean of a run
   double rejected_share = 0;              // of the matches
 };
+
+/// Of a mean over runs, 95 %, Student's t.
+struct MeanInterval {
+  double low_m = 0, high_m = 0;
+};
+
+/// What `one` errs more than `other` in the same run. Of the same task both fly the same vehicles, sensors'
+/// errors and air, which drop out here and are most of what Comparison's own intervals consist of. Nothing
+/// where a flight was lost, or of a single run.
+std::optional<MeanInterval> paired_difference(const Comparison& one, const Comparison& other);
 
 /// `progress` is called from one thread at a time with the number of finished runs (of all processes, as if
 /// they were equally fast). With several processes all of them must call this, with the same task; all get

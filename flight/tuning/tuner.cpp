@@ -48,6 +48,11 @@ double cost_m(const Course& course, std::string_view controller, const GainTable
 
 }  // namespace
 
+double tuning_cost_m(std::string_view controller, const GainTable& gains, const DisturbanceMap& map,
+                     const TuningSettings& settings) {
+  return cost_m(Course(), controller, gains, map, settings);
+}
+
 Tuned tune(std::string_view controller, const DisturbanceMap& map, const TuningSettings& settings,
            const std::function<void(int)>& progress) {
   const Course course;

@@ -10,8 +10,8 @@
 namespace tunnelrig {
 
 struct TuningSettings {
-  int budget = 300;  // evaluations per controller
-  int runs = 2;      // flights of either scenario in an evaluation, the same ones in every evaluation
+  int budget = 1000;  // evaluations per controller; the cascades are not at their end with 300
+  int runs = 2;       // flights of either scenario in an evaluation, the same ones in every evaluation
   int workers = 0;
   std::uint64_t seed = 20260301;  // of flights and optimiser; comparisons use others
   double effort_m_per_N = 0.003;  // rms thrust that moves a rotor about its mean counts as so much error
@@ -23,6 +23,10 @@ struct Tuned {
   std::map<std::string, double> gains;
   double cost_m = 0, start_cost_m = 0;  // root of the mean of squares
 };
+
+/// What tuning minimises, of a controller with given gains, m.
+double tuning_cost_m(std::string_view controller, const GainTable& gains, const DisturbanceMap& map,
+                     const TuningSettings& settings = {});
 
 /// Searches the logarithms of the controller's gains between their limits, from their defaults.
 Tuned tune(std::string_view controller, const DisturbanceMap& map, const TuningSettings& settings,

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace tunnelrig {
 namespace {
@@ -115,14 +116,39 @@ inline const DisturbanceField::Cell& DisturbanceField::Axis::cell_of(double valu
   return *cell;
 }
 
-DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, double thrust_error,
-                                   double uneven_error) {
+// A sum of waves of random direction, length and phase, which is nearly normal at every place and has the
+// covariance exp(−d²/2ℓ²) (Rahimi and Recht 2007).
+MapError::MapError(double size, Random& random)
+    : amplitude_(size * std::sqrt(2.0 / static_cast<double>(waves_.size()))) {
+  // Normalised; shorter than the field's own 0.8, as a fit's errors change from one measured place to the
+  // next. Assumed.
+  constexpr double kLength = 0.5;
+  for (Wave& wave : waves_) {
+    wave.y = random.normal() / kLength;
+    wave.z = random.normal() / kLength;
+    wave.phase_rad = 2 * std::numbers::pi * random.uniform();
+  }
+}
+
+double MapError::at(double y_norm, double z_norm) const {
+  if (amplitude_ == 0) return 0;
+  double sum = 0;
+  for (const Wave& wave : waves_) sum += std::cos(wave.y * y_norm + wave.z * z_norm + wave.phase_rad);
+  return amplitude_ * sum;
+}
+
+DisturbanceField::DisturbanceField(const DisturbanceMap& map, double scale, const MapError& thrust_error,
+                                   const MapError& uneven_error) {
   const double coverage = map.coverage_factor > 0 ? map.coverage_factor : 2;
-  const auto fractions = [&](const MapLayer& layer, double error) {
+  const auto fractions = [&](const MapLayer& layer, const MapError& error) {
     std::vector<double> f(layer.value_percent.size());
-    for (std::size_t i = 0; i < f.size(); ++i) {
-      const double u95 = layer.u95_percent[i];
-      f[i] = 0.01 * (scale * layer.value_percent[i] + (std::isnan(u95) ? 0 : error * u95 / coverage));
+    for (std::size_t row = 0; row < map.grid.z_norm.size(); ++row) {
+      for (std::size_t column = 0; column < map.grid.y_norm.size(); ++column) {
+        const std::size_t i = map.grid.index(row, column);
+        const double u95 = layer.u95_percent[i];  // which may be NaN
+        const double wrong = u95 > 0 ? error.at(map.grid.y_norm[column], map.grid.z_norm[row]) : 0;
+        f[i] = 0.01 * (scale * layer.value_percent[i] + (wrong != 0 ? wrong * u95 / coverage : 0));
+      }
     }
     return f;
   };

@@ -2,7 +2,9 @@
 #pragma once
 
 #include "analysis/maps/disturbance_map.h"
+#include "flight/vehicle/random.h"
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -19,6 +21,25 @@ struct Disturbance {
   double left_factor() const { return (1 + thrust_change) * (1 - uneven); }
 };
 
+/// By how many of its standard uncertainties a layer of a map is wrong, place by place: one draw of a random
+/// field of variance 1. It changes over the section, as a fit's errors do. One that had the same sign
+/// everywhere would be a constant force, which an integral takes out as if it were not there.
+class MapError {
+ public:
+  MapError() = default;  // none
+  MapError(double size, Random& random);
+
+  double at(double y_norm, double z_norm) const;
+
+ private:
+  struct Wave {
+    double y, z, phase_rad;
+  };
+
+  std::array<Wave, 32> waves_{};
+  double amplitude_ = 0;
+};
+
 /// Bicubic spline through the map's nodes (de Boor 1962), twice continuously differentiable. It is built from
 /// the right half and mirrored, so that ΔC_T is even and U odd in ȳ to the last bit. Outside [−1, 1]² the
 /// value at the nearest point of the border.
@@ -27,10 +48,9 @@ class DisturbanceField {
   /// No disturbance anywhere.
   DisturbanceField() = default;
 
-  /// `scale` multiplies both layers; the errors are in units of each layer's standard uncertainty, shared by
-  /// all nodes of it, and none where it is not known.
-  explicit DisturbanceField(const DisturbanceMap& map, double scale = 1, double thrust_error = 0,
-                            double uneven_error = 0);
+  /// `scale` multiplies both layers. There are no errors where the uncertainty is not known.
+  explicit DisturbanceField(const DisturbanceMap& map, double scale = 1, const MapError& thrust_error = {},
+                            const MapError& uneven_error = {});
 
   Disturbance at(double y_norm, double z_norm) const;
 

@@ -239,6 +239,8 @@ TEST_F(Fly, OptionsThatWouldDoNothingAreRefused) {
   EXPECT_THAT(refusal("--budget 20"), HasSubstr("--budget: is of tuning"));
   EXPECT_THAT(refusal("--weak-rotor 2"), HasSubstr("--weak-rotor: says which rotor"));
   EXPECT_THAT(refusal("--position given --lidar-sigma-mm 20"), HasSubstr("there is no LIDAR"));
+  EXPECT_THAT(refusal("--position given --blind-s 1,2"), HasSubstr("there is no LIDAR"));
+  EXPECT_THAT(refusal("--blind-s 3,2"), HasSubstr("must be two times, the second one later"));
 }
 
 }  // namespace

@@ -208,6 +208,17 @@ TEST(ScanMatcher, AmbiguousPlacesAreToldApartByAPrior) {
   EXPECT_LT((match.position_m - at).norm(), 0.01);
 }
 
+TEST(ScanMatcher, AnUncertainPriorIsSearchedAroundAsFarAsItMayBeWrong) {
+  SimulatedLidar lidar(kSquare, {.range_sigma_m = 0.01}, test::seed());
+  ScanMatcher matcher(kSquare);
+  const SectionPoint at(0.4, 0), believed(-0.2, 0);
+  const Scan scan = lidar.sweep({at, {}});
+  EXPECT_FALSE(matcher.match(scan, {}, believed).accepted) << "it is said to be within 0.25 m";
+  const Match match = matcher.match(scan, {}, SearchPrior(believed, {0.2, 0.01}));
+  ASSERT_TRUE(match.accepted) << text(match.reason);
+  EXPECT_LT((match.position_m - at).norm(), 0.01);
+}
+
 TEST(ScanMatcher, PuddlesDropOutsAndMotionAreBorne) {
   SimulatedLidar lidar(
       kSquare,
@@ -305,6 +316,10 @@ TEST(ScanMatcher, BadInputIsAnError) {
   EXPECT_THAT(message_of([&] { matcher.match(scan, {NAN, 0, 0}); }), HasSubstr("attitude"));
   EXPECT_THAT(message_of([&] { matcher.match(scan, {0, 0, 1.5}); }), HasSubstr("75°"));
   EXPECT_THAT(message_of([&] { matcher.match(scan, {}, SectionPoint(NAN, 0)); }), HasSubstr("prior"));
+  EXPECT_THAT(message_of([&] {
+                matcher.match(scan, {}, SearchPrior({0, 0}, {0, INFINITY}));
+              }),
+              HasSubstr("prior"));
   EXPECT_THAT(message_of([&] { matcher.match(scan, {}, {}, {0.02, {NAN, 0}}); }), HasSubstr("motion"));
   EXPECT_THAT(message_of([] { ScanMatcher(kSquare, {.cell_m = 0}); }), HasSubstr("cell_m"));
   EXPECT_THAT(message_of([] { ScanMatcher(kSquare, {.form = HoughForm::circle}); }),

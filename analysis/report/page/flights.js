@@ -49,7 +49,7 @@ function drawFlightErrors({reference, controllers}, key, symbol) {
   };
 }
 
-function flightTable({controllers}) {
+function flightTable({controllers, best}) {
   const mm = (key, decimals = 1) => (row) => fixed(row[key], decimals);
   return table('Errors over all runs, contacts, estimator', [
     {name: 'controller', cell: (row) => row.name, text: true},
@@ -58,6 +58,9 @@ function flightTable({controllers}) {
     {name: 'rms y [mm]', cell: mm('rms_y_mm')},
     {name: 'rms z [mm]', cell: mm('rms_z_mm')},
     {name: 'mean rms, 95 % [mm]', cell: ({ci95_rms_mm: ci}) => (ci ? `${fixed(ci[0], 1)} to ${fixed(ci[1], 1)}` : '–')},
+    ...(controllers.some((row) => row.more_than_best_mm) ?
+        [{name: `more than ${best}, 95 % [mm]`, cell: ({more_than_best_mm: ci}) => (ci ? `${fixed(ci[0], 2)} to ${fixed(ci[1], 2)}` : '–')}] :
+        []),
     {name: 'max y [mm]', cell: mm('max_y_mm')},
     {name: 'max z [mm]', cell: mm('max_z_mm')},
     {name: 'contacts', cell: (row) => String(row.contacts)},
@@ -80,7 +83,7 @@ function flightsSection({flights, command}) {
       const {tunnel, scenario, map, position, extrapolated} = flight;
       const title = `${scenario} in the ${tunnel} tunnel`;
       const caption = `The first run of each controller; map: ${map}; position: ${
-          positions[position] ?? position}. Single runs have no error bars; the intervals of the table are Student’s, over the runs. A click on the legend hides or shows.`;
+          positions[position] ?? position}. Single runs have no error bars; the intervals of the table are Student’s, over the runs. All controllers fly the same runs, so they are compared run by run: two that differ have an interval of “more than” without 0, however much those of the means overlap. A click on the legend hides or shows.`;
       return figure(title, [], [
         plot(`Paths, ${title}`, (width) => Math.min(560, Math.max(380, 0.7 * width)), (width) => drawPaths(flight, width)),
         plot(`Error in y, ${title}`, () => 260, () => drawFlightErrors(flight, 'y_m', 'y')),

@@ -131,6 +131,8 @@ JSON.stringify([
     .map((f) => "the page does not say that the position of " + f.scenario + " is by " + f.position),
   ...flights.filter((f) => f.extrapolated && !document.body.innerText.includes("Extrapolated, in normalised coordinates: " + f.extrapolated))
     .map((f) => "the page does not say that " + f.scenario + " is extrapolated"),
+  ...flights.filter((f) => f.best && f.controllers.length > 1 && !document.body.innerText.includes("more than " + f.best + ", 95 %"))
+    .map((f) => "the page does not compare the controllers of " + f.scenario + " run by run"),
   ...[...document.querySelectorAll(".plot .yaxislayer-above, .plot .xaxislayer-above")].flatMap((axis) => {
     const numbers = [...axis.querySelectorAll(".ytick text, .xtick text")].map((t) => t.textContent).filter((t) => /^[−+]?[0-9.]+$/.test(t));
     return new Set(numbers).size < numbers.length ? ["an axis has the same number twice: " + numbers.join(" ")] : [];

@@ -53,6 +53,37 @@ TEST(DisturbanceField, IsMirroredToTheLastBitAndHeldOutside) {
   EXPECT_EQ(field.at(0, 0.7).uneven, 0);
 }
 
+/// One percentage point of standard uncertainty: so wrong the map is, but not everywhere in the same
+/// direction, which would be a constant force that any integral removes.
+TEST(DisturbanceField, IsWrongByItsUncertaintyInPlacesOfBothSigns) {
+  DisturbanceMap map = published_disturbance_map();
+  map.grid = {};
+  for (int i = -4; i <= 4; ++i) {  // hundreds of finer ones would take seconds
+    map.grid.y_norm.push_back(0.25 * i);
+    map.grid.z_norm.push_back(0.25 * i);
+  }
+  for (MapLayer* layer : {&map.delta_ct, &map.uneven_thrust}) {
+    layer->value_percent.assign(map.grid.nodes(), 0);
+    layer->u95_percent.assign(map.grid.nodes(), map.coverage_factor);
+  }
+  Random random(9);
+  constexpr int kDraws = 400;
+  double squares = 0;
+  int differ_far = 0, differ_near = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    const MapError thrust(1, random), uneven(1, random);
+    const DisturbanceField field(map, 1, thrust, uneven);
+    const double here = field.at(0.2, -0.8).thrust_change, far = field.at(0.9, 0.8).thrust_change,
+                 near = field.at(0.25, -0.8).thrust_change;
+    squares += here * here / kDraws;
+    differ_far += here * far < 0 ? 1 : 0;
+    differ_near += here * near < 0 ? 1 : 0;
+  }
+  EXPECT_NEAR(std::sqrt(squares), 0.01, 0.001);
+  EXPECT_GT(differ_far, 0.4 * kDraws);
+  EXPECT_LT(differ_near, 0.1 * kDraws);
+}
+
 TEST(DisturbanceField, HasNoKinks) {
   const DisturbanceField field(published_disturbance_map());
   constexpr double kStep = 1e-4;
