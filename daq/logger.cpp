@@ -117,10 +117,15 @@ class RunSink : public FrameSink {
 class TrackerSink : public PacketSink {
  public:
   /// Before the first packet the longest that there may be is waited for.
-  TrackerSink(LossTracker& tracker, FrameSink& sink, double rate_hz)
-      : tracker_(tracker), sink_(sink), packet_s_(static_cast<double>(TRW_MAX_FRAMES) / rate_hz) {}
+  TrackerSink(LossTracker& tracker, FrameSink& sink, double rate_hz, const PacketSource& source)
+      : tracker_(tracker),
+        sink_(sink),
+        source_(source),
+        packet_s_(static_cast<double>(TRW_MAX_FRAMES) / rate_hz) {}
   void packet(const Packet& packet) override {
     const trw_header& header = packet.header;
+    const auto run = source_.boundary();
+    if (run && header.boot_id == run->boot_id && header.first_sequence < run->first_sequence) return;
     const std::uint64_t stored = tracker_.ledger().frames_stored;
     tracker_.take(packet, time_s_, sink_);
     // What brings nothing new may be of another boot. A board may start again without a new id.
@@ -138,6 +143,7 @@ class TrackerSink : public PacketSink {
  private:
   LossTracker& tracker_;
   FrameSink& sink_;
+  const PacketSource& source_;
   ClockFit clock_;
   double packet_s_, time_s_ = 0;
 };
@@ -203,7 +209,7 @@ class Recording {
         file_(file),
         writer_(file, run, RawFormat{}, static_cast<std::size_t>(kChunk_s * info.daq.sample_rate_hz)),
         sink_(writer_, summarizer, settings.watcher),
-        packets_(tracker_, sink_, info.daq.sample_rate_hz),
+        packets_(tracker_, sink_, info.daq.sample_rate_hz, source),
         watchdog_(settings.silence_s, settings.give_up_s),
         source_(source) {}
 

@@ -26,6 +26,12 @@ struct ReadResult {
       nullptr;  // what went wrong before these bytes: a static text for the gap, if there is one
 };
 
+/// Where a run begins, on a board that says so: what it sampled under lower numbers of this boot was before.
+struct RunBoundary {
+  std::uint32_t boot_id = 0;
+  std::uint64_t first_sequence = 0;
+};
+
 /// A stream of bytes in which packets stand (docs/wire-format.md). Used by one thread at a time.
 class PacketSource {
  public:
@@ -33,6 +39,10 @@ class PacketSource {
 
   /// A run begins: what waits from before may be thrown away.
   virtual void begin_run() {}
+
+  /// Of the run that has begun, where the source knows. Whoever has got a byte of it may ask, on any thread:
+  /// it is the same until the next run begins.
+  virtual std::optional<RunBoundary> boundary() const { return {}; }
 
   /// Nobody records, and this is called several times a second meanwhile: what has come since is thrown away,
   /// or the next run would begin with it. Does not wait.

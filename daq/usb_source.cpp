@@ -45,12 +45,19 @@ class UsbSource : public PacketSource {
     return static_cast<std::uint64_t>(frames);
   }
 
-  /// What the board sampled while nobody recorded is no part of the run.
+  /// What the board sampled while nobody recorded is no part of the run. Where it cannot be stopped just now
+  /// (its cable was pulled in the pause), the run's first bytes are those of a board that was opened anew.
   void begin_run() override {
     rest_.clear();
-    if (!stream_ || !board_->stop()) return;
-    stream_->discard(kQuiet);
-    board_->start(settings_.pattern);
+    break_cause_ = nullptr;
+    run_begins_ = true;
+    if (!stream_ || broken_ || !start_anew()) close();
+  }
+
+  std::optional<RunBoundary> boundary() const override { return boundary_; }
+
+  void idle() override {
+    if (stream_) stream_->discard(std::chrono::milliseconds(0));
   }
 
   ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds timeout) override {
@@ -116,20 +123,32 @@ class UsbSource : public PacketSource {
     board_.reset();
   }
 
-  /// A board that is sampling already, since only its cable or its host had gone, goes on without a break.
+  /// Drops what the board and the stream hold. Whatever of it is still on its way is known by its number.
+  bool start_anew() {
+    if (!board_->stop()) return false;
+    stream_->discard(kQuiet);
+    const auto statistics = board_->statistics();
+    if (!statistics || !board_->start(settings_.pattern)) return false;
+    if (run_begins_) boundary_ = {board_->identity().boot_id, statistics->frames};
+    run_begins_ = false;
+    return true;
+  }
+
+  /// Within a run a board that is sampling already, since only its cable or its host had gone, goes on
+  /// without a break.
   bool open(std::string& why) {
     close();
     board_ = UsbBoard::open(bus_, settings_.serial, why);
     if (!board_) return false;
-    const bool known =
-        board_->identity().boot_id == boot_id_ && (board_->identity().flags & TRW_FLAG_RUNNING) != 0;
-    if (!known && !configure(why)) {
+    const bool goes_on = !run_begins_ && board_->identity().boot_id == boot_id_ &&
+                         (board_->identity().flags & TRW_FLAG_RUNNING) != 0;
+    if (!goes_on && !configure(why)) {
       close();
       return false;
     }
     const auto rate = board_->rate();
     stream_ = std::make_unique<UsbStream>(board_->handle(), settings_.stream);
-    if (!rate || rate->tick_hz == 0 || (!known && !board_->start(settings_.pattern))) {
+    if (!rate || rate->tick_hz == 0 || (!goes_on && !start_anew())) {
       why = "the board does not start";
       close();
       return false;
@@ -174,6 +193,8 @@ class UsbSource : public PacketSource {
   std::deque<UsbStream::Unread> rest_;  // of a stream that broke
   const char* break_cause_ = nullptr;   // of a break that is not told yet
   std::uint32_t boot_id_ = 0;
+  bool run_begins_ = true;  // and has got no byte yet: no board goes on
+  std::optional<RunBoundary> boundary_;
   std::chrono::milliseconds silent_{0}, silence_limit_{0};
   double next_statistics_s_ = 0;
   std::atomic<std::int64_t> ring_frames_{-1};  // none yet

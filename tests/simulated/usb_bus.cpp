@@ -1,5 +1,8 @@
 #include "simulated/usb_bus.h"
 
+#include "simulated/device_text.h"
+
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -8,6 +11,7 @@
 #include <cstring>
 #include <ctime>
 #include <stdexcept>
+#include <utility>
 
 #include <fcntl.h>
 #include <linux/usbdevice_fs.h>
@@ -29,11 +33,6 @@ UMockdevTestbed* testbed() {
   return bed;
 }
 
-int next_number() {
-  static int number = 1;
-  return ++number;
-}
-
 double now_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -46,20 +45,6 @@ double seconds_of(clockid_t clock) {
   timespec used{};
   ::clock_gettime(clock, &used);
   return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
-}
-
-std::string hex_descriptors(Board& board) {
-  std::string text;
-  for (const std::uint16_t value : {std::uint16_t{0x0100}, std::uint16_t{0x0200}}) {
-    std::array<std::uint8_t, 256> data{};
-    const int size = board.control(0x80, 6, value, 0, 255, data.data());
-    for (int i = 0; i < size; ++i) {
-      char byte[3];
-      std::snprintf(byte, sizeof byte, "%02x", data[static_cast<std::size_t>(i)]);
-      text += byte;
-    }
-  }
-  return text;
 }
 
 }  // namespace
@@ -106,29 +91,22 @@ void UsbBus::replace_node_by_gate() {
 }
 
 void UsbBus::plug() {
-  std::string descriptors;
+  std::string text;
   {
     const std::lock_guard lock(mutex_);
-    number_ = next_number();
+    static int newest = 1;
+    number_ = ++newest;
+    char node[32];
+    std::snprintf(node, sizeof node, "/dev/bus/usb/001/%03d", number_);
+    node_ = node;
     board_.enumerate();  // a kernel would have done it
-    descriptors = hex_descriptors(board_);
+    text = device_text(board_, number_, node_);
     mangled_.clear();
     mangled_used_ = 0;
     clock_s_ = now_s();
   }
-  char text[2048];
-  std::snprintf(text, sizeof text, "/dev/bus/usb/001/%03d", number_);
-  node_ = text;
-  std::snprintf(
-      text, sizeof text,
-      "P: /devices/usb1/1-1\nN: bus/usb/001/%03d\nE: DEVNAME=%s\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\n"
-      "E: BUSNUM=001\nE: DEVNUM=%03d\nE: MAJOR=189\nE: MINOR=%d\nE: PRODUCT=1209/1/100\nA: busnum=1\\n\n"
-      "A: devnum=%d\\n\nA: speed=12\\n\nA: bConfigurationValue=1\\n\nA: idVendor=1209\\n\nA: "
-      "idProduct=0001\\n\n"
-      "H: descriptors=%s\n",
-      number_, node_.c_str(), number_, number_ - 1, number_, descriptors.c_str());
   GError* error = nullptr;
-  require(umockdev_testbed_add_from_string(testbed(), text, &error) != 0, error);
+  require(umockdev_testbed_add_from_string(testbed(), text.c_str(), &error) != 0, error);
   require(umockdev_testbed_attach_ioctl(testbed(), node_.c_str(), handler_, &error) != 0, error);
   replace_node_by_gate();
   {
@@ -147,6 +125,7 @@ void UsbBus::unplug() {
       pending_.pop_front();
       complete(urb, -ESHUTDOWN);
     }
+    cancelled_.clear();
     show_ready(true);
     board_.controller.reset();
   }
@@ -158,6 +137,13 @@ void UsbBus::unplug() {
 void UsbBus::set_deaf(bool deaf) {
   const std::lock_guard lock(mutex_);
   deaf_ = deaf;
+  if (deaf) return;
+  for (usbdevfs_urb* urb : std::exchange(cancelled_, {})) cancel(urb);
+  std::erase_if(pending_, [this](usbdevfs_urb* urb) {
+    if (urb->type != USBDEVFS_URB_TYPE_CONTROL) return false;
+    answer(urb);
+    return true;
+  });
 }
 
 bool UsbBus::fail_transfer(int error, bool keep) {
@@ -313,23 +299,31 @@ long UsbBus::submit(usbdevfs_urb* urb) {
   if (deaf_ || urb->type != USBDEVFS_URB_TYPE_CONTROL) {
     pending_.push_back(urb);
     wake_.notify_all();
-    return 0;
+  } else {
+    answer(urb);
   }
+  return 0;
+}
+
+void UsbBus::answer(usbdevfs_urb* urb) {
   auto* setup = static_cast<std::uint8_t*>(urb->buffer);
   const int size = board_.controller.control(setup, setup + 8);
   if (size >= 0) urb->actual_length = size;
   complete(urb, size == kStall ? -EPIPE : size < 0 ? -EPROTO : 0);
-  return 0;
 }
 
-long UsbBus::discard(void* urb, int& error) {
-  for (auto at = pending_.begin(); at != pending_.end() && !deaf_; ++at) {
-    if (*at != urb) continue;
-    pending_.erase(at);
-    complete(static_cast<usbdevfs_urb*>(urb), -ENOENT);
+bool UsbBus::cancel(usbdevfs_urb* urb) {
+  if (std::erase(pending_, urb) == 0) return false;
+  complete(urb, -ENOENT);
+  return true;
+}
+
+long UsbBus::discard(usbdevfs_urb* urb, int& error) {
+  if (deaf_) {
+    cancelled_.push_back(urb);  // accepted, and then nothing until the bus comes back
     return 0;
   }
-  if (deaf_) return 0;  // accepted, and then nothing
+  if (cancel(urb)) return 0;
   error = gone_ ? ENODEV : EINVAL;
   return -1;
 }
@@ -356,7 +350,8 @@ long UsbBus::ioctl(unsigned long request, void* argument, int number, int& error
         USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
     return 0;
   }
-  if (request == static_cast<unsigned>(USBDEVFS_DISCARDURB)) return discard(argument, error);
+  if (request == static_cast<unsigned>(USBDEVFS_DISCARDURB))
+    return discard(static_cast<usbdevfs_urb*>(argument), error);
   if (dead) {
     error = ENODEV;
     return -1;

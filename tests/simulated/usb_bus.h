@@ -42,7 +42,7 @@ class UsbBus {
   void plug();
   void unplug();
 
-  /// From now on nothing is completed and nothing cancelled: a hung host controller.
+  /// Nothing is completed and nothing cancelled meanwhile: a hung host controller.
   void set_deaf(bool deaf);
 
   /// The oldest pending transfer ends with `error` (a positive errno); what it held already is `keep` or
@@ -68,7 +68,9 @@ class UsbBus {
   long ioctl(unsigned long request, void* argument, int number, int& error);
   long reap(void** urb, int number, bool dead, int& error);
   long submit(usbdevfs_urb* urb);
-  long discard(void* urb, int& error);
+  void answer(usbdevfs_urb* urb);
+  bool cancel(usbdevfs_urb* urb);
+  long discard(usbdevfs_urb* urb, int& error);
   static int on_ioctl(_UMockdevIoctlBase*, _UMockdevIoctlClient* client, void* self);
 
   Board& board_;
@@ -77,6 +79,7 @@ class UsbBus {
   std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<usbdevfs_urb*> pending_;
+  std::vector<usbdevfs_urb*> cancelled_;           // while it was deaf
   std::map<int, std::deque<usbdevfs_urb*>> done_;  // by device number: one that is gone is still reaped
   std::vector<std::uint8_t> mangled_;              // bytes on the wire that no transfer has taken yet
   std::size_t mangled_used_ = 0;
