@@ -29,6 +29,7 @@ void sampling_init(void) {
   WR(ADC_SMPR2, kSampleTime | (kSampleTime << 3) | (kSampleTime << 6) | (kSampleTime << 9));
   WR(ADC_SQR1, (SAMPLING_CHANNELS - 1u) << 20);
   WR(ADC_SQR3, /* channel 0 first, then */ (1u << 5) | (2u << 10) | (3u << 15));
+  WR(TIM2 + TIM_CR2, 2u << 4); /* the update is the trigger output */
 }
 
 static void forget_interrupt(uint32_t irq) { WR(NVIC_ICPR(irq / 32u), BIT(irq % 32u)); }
@@ -76,21 +77,20 @@ static void start_anew(void) {
 
 void sampling_start(uint32_t ticks_per_scan, uint32_t scans_per_frame) {
   conversions = scans_per_frame * SAMPLING_CHANNELS;
-  WR(TIM2 + TIM_CR1, 0);
-  start_anew();
-  sampling = true;
   WR(TIM2 + TIM_PSC, 0);
   WR(TIM2 + TIM_ARR, ticks_per_scan - 1u);
   WR(TIM2 + TIM_CNT, 0);
-  WR(TIM2 + TIM_EGR, BIT(0)); /* loads the prescaler, before the trigger output is the update */
-  WR(TIM2 + TIM_CR2, 2u << 4);
+  /* Loads the prescaler. It is a trigger whatever the trigger output is (18.4.2, MMS 000: UG; 010: the update
+   * that UG makes), so that the converter must not listen yet: it would scan at once, a frame too many. */
+  WR(TIM2 + TIM_EGR, BIT(0));
+  start_anew();
+  sampling = true;
   WR(TIM2 + TIM_CR1, BIT(0));
 }
 
 void sampling_stop(void) {
   sampling = false;
   WR(TIM2 + TIM_CR1, 0);
-  WR(TIM2 + TIM_CR2, 0); /* the UG of the next start is no trigger */
   (void)halt();
 }
 
