@@ -253,10 +253,11 @@ void Logging::show(ProgressBar& bar, const LogProgress& progress) const {
   bar.show(progress.elapsed_s, progress.duration_s,
            fmt::format("{} frames, {} lost, {}{}", progress.ledger->frames_stored,
                        progress.ledger->frames_lost, means_text(volts),
-                       progress.held_up           ? ", ANOTHER PROGRAM HOLDS THE FILE"
-                       : !progress.silent         ? ""
-                       : progress.instead.empty() ? ", SILENT"
-                                                  : fmt::format(", ONLY {}", progress.instead)));
+                       progress.held_up            ? ", ANOTHER PROGRAM HOLDS THE FILE"
+                       : !progress.silent          ? ""
+                       : !progress.problem.empty() ? fmt::format(", SILENT: {}", progress.problem)
+                       : progress.instead.empty()  ? ", SILENT"
+                                                   : fmt::format(", ONLY {}", progress.instead)));
 }
 
 void Logging::print(const std::string& name, const PlannedRun& planned, const LogOutcome& outcome) const {

@@ -268,6 +268,7 @@ class Recording {
               .duration_s = settings_.duration_s,
               .silent = watchdog_.silent(),
               .instead = watchdog_.silent() ? unusable_between(at_last_frame_, now) : "",
+              .problem = watchdog_.silent() ? source_.problem() : "",
               .held_up = Clock::now() - oldest_pending_ > kHeldUp,
               .mean_counts = sink_.means(),
               .ledger = &now,
@@ -304,9 +305,9 @@ class Recording {
   }
 
   std::string reason_to_give_up() const {
-    const std::string instead = unusable_between(at_last_frame_, ledger());
-    return fmt::format("no {}frame for {:g} s{}", instead.empty() ? "" : "new ", settings_.give_up_s,
-                       instead.empty() ? "" : ", only " + instead);
+    const std::string instead = unusable_between(at_last_frame_, ledger()), problem = source_.problem();
+    return fmt::format("no {}frame for {:g} s{}{}", instead.empty() ? "" : "new ", settings_.give_up_s,
+                       instead.empty() ? "" : ", only " + instead, problem.empty() ? "" : ": " + problem);
   }
 
   Ledger ledger() const {
@@ -316,6 +317,7 @@ class Recording {
     ledger.silences = silences_;
     ledger.end_reason = end_reason_;
     ledger.source = source_.name();
+    if (const auto board = source_.board()) ledger.board_serial = board->serial;
     return ledger;
   }
 

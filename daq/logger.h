@@ -43,6 +43,7 @@ struct LogProgress {
   double duration_s = 0;
   bool silent = false;
   std::string instead;   // where silent: what arrives all the same and cannot be used; else empty
+  std::string problem;   // where silent: why the board cannot be had, where its source says so
   bool held_up = false;  // another program has been writing to the file for a while: the frames wait here
   std::array<double, 4> mean_counts{};  // of the frames so far
   const Ledger* ledger = nullptr;

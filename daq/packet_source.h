@@ -26,6 +26,12 @@ struct ReadResult {
       nullptr;  // what went wrong before these bytes: a static text for the gap, if there is one
 };
 
+/// The board behind a source that knows it. The same from the source's first byte to its last: a run of two
+/// boards would be one of two sets of load cells.
+struct BoardInUse {
+  std::string serial;
+};
+
 /// Where a run begins, on a board that says so: what it sampled under lower numbers of this boot was before.
 struct RunBoundary {
   std::uint32_t boot_id = 0;
@@ -57,6 +63,13 @@ class PacketSource {
 
   /// The most frames that ever waited on the board, where the source knows. Any thread may ask.
   virtual std::optional<std::uint64_t> ring_frames() const { return {}; }
+
+  /// Any thread may ask.
+  virtual std::optional<BoardInUse> board() const { return {}; }
+
+  /// Why the board cannot be had just now, for people; empty where it can, or nobody knows. Any thread may
+  /// ask.
+  virtual std::string problem() const { return ""; }
 
   /// As the ledger names it: "tcp:localhost:4000". Any thread may ask.
   virtual std::string name() const = 0;

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -28,6 +29,7 @@ class UsbSource : public PacketSource {
     for (int attempt = 0; attempt < kOpenTries && !open(why); ++attempt) {
     }
     if (!stream_) throw InputError::in(name_, "{}", why);
+    settings_.serial = board_->serial();  // from now on no other board fits
   }
 
   ~UsbSource() override {
@@ -38,6 +40,12 @@ class UsbSource : public PacketSource {
   UsbSource& operator=(const UsbSource&) = delete;
 
   std::string name() const override { return name_; }
+  std::optional<BoardInUse> board() const override { return BoardInUse{settings_.serial}; }
+
+  std::string problem() const override {
+    const std::lock_guard lock(problem_mutex_);
+    return problem_;
+  }
 
   std::optional<std::uint64_t> ring_frames() const override {
     const std::int64_t frames = ring_frames_;
@@ -82,7 +90,10 @@ class UsbSource : public PacketSource {
   bool reopen() override {
     if (stream_ && !broken_) return true;
     std::string why;
-    return open(why);
+    const bool is_back = open(why);
+    const std::lock_guard lock(problem_mutex_);
+    problem_ = is_back ? "" : why;
+    return is_back;
   }
 
  private:
@@ -199,6 +210,8 @@ class UsbSource : public PacketSource {
   double next_statistics_s_ = 0;
   std::atomic<std::int64_t> ring_frames_{-1};  // none yet
   bool broken_ = false;
+  mutable std::mutex problem_mutex_;
+  std::string problem_;
 };
 
 std::optional<std::uint32_t> whole(std::string_view text) {
