@@ -317,7 +317,10 @@ class Recording {
     ledger.silences = silences_;
     ledger.end_reason = end_reason_;
     ledger.source = source_.name();
-    if (const auto board = source_.board()) ledger.board_serial = board->serial;
+    if (const auto board = source_.board()) {
+      ledger.board_serial = board->serial;
+      ledger.conversions_per_frame = board->conversions_per_frame;
+    }
     return ledger;
   }
 

@@ -30,6 +30,7 @@ struct ReadResult {
 /// boards would be one of two sets of load cells.
 struct BoardInUse {
   std::string serial;
+  std::uint32_t conversions_per_frame = 0;
 };
 
 /// Where a run begins, on a board that says so: what it sampled under lower numbers of this boot was before.

@@ -30,6 +30,7 @@ class UsbSource : public PacketSource {
     }
     if (!stream_) throw InputError::in(name_, "{}", why);
     settings_.serial = board_->serial();  // from now on no other board fits
+    board_in_use_ = {settings_.serial, settings_.oversampling};
   }
 
   ~UsbSource() override {
@@ -40,7 +41,7 @@ class UsbSource : public PacketSource {
   UsbSource& operator=(const UsbSource&) = delete;
 
   std::string name() const override { return name_; }
-  std::optional<BoardInUse> board() const override { return BoardInUse{settings_.serial}; }
+  std::optional<BoardInUse> board() const override { return board_in_use_; }
 
   std::string problem() const override {
     const std::lock_guard lock(problem_mutex_);
@@ -151,23 +152,10 @@ class UsbSource : public PacketSource {
     close();
     board_ = UsbBoard::open(bus_, settings_.serial, why);
     if (!board_) return false;
-    const bool goes_on = !run_begins_ && board_->identity().boot_id == boot_id_ &&
-                         (board_->identity().flags & TRW_FLAG_RUNNING) != 0;
-    if (!goes_on && !configure(why)) {
+    if (!set_going(why)) {
       close();
       return false;
     }
-    const auto rate = board_->rate();
-    stream_ = std::make_unique<UsbStream>(board_->handle(), settings_.stream);
-    if (!rate || rate->tick_hz == 0 || (!goes_on && !start_anew())) {
-      why = "the board does not start";
-      close();
-      return false;
-    }
-    // A slow board is not a silent one: three of its packets.
-    const double frame_s = static_cast<double>(rate->ticks_per_frame) / rate->tick_hz;
-    silence_limit_ =
-        std::max(settings_.silence, std::chrono::milliseconds(std::llround(3e3 * std::max(frame_s, 0.012))));
     boot_id_ = board_->identity().boot_id;
     silent_ = std::chrono::milliseconds(0);
     next_statistics_s_ = steady_seconds() + kStatistics_s;
@@ -175,29 +163,64 @@ class UsbSource : public PacketSource {
     return true;
   }
 
-  bool configure(std::string& why) {
-    if (settings_.rate_numerator_hz == 0 && settings_.oversampling == 0) return true;
-    const auto now = board_->rate();
-    if (!now || !board_->stop()) {
-      why = "the board does not answer";
+  bool set_going(std::string& why) {
+    auto rate = board_->rate();
+    const bool goes_on = !run_begins_ && board_->identity().boot_id == boot_id_ &&
+                         (board_->identity().flags & TRW_FLAG_RUNNING) != 0 && rate && is_as_asked(*rate);
+    if (!goes_on && rate && !is_as_asked(*rate)) {
+      if (!configure(*rate, why)) return false;
+      rate = board_->rate();
+    }
+    stream_ = std::make_unique<UsbStream>(board_->handle(), settings_.stream);
+    if (!rate || rate->tick_hz == 0 || (!goes_on && !start_anew())) {
+      why = "the board does not start";
       return false;
     }
-    trw_rate_wish wish{now->tick_hz, now->ticks_per_frame, now->oversampling};
+    demand(*rate);
+    // A slow board is not a silent one: three of its packets.
+    const double frame_s = static_cast<double>(rate->ticks_per_frame) / rate->tick_hz;
+    silence_limit_ =
+        std::max(settings_.silence, std::chrono::milliseconds(std::llround(3e3 * std::max(frame_s, 0.012))));
+    return true;
+  }
+
+  bool is_as_asked(const trw_rate& rate) const {
+    const bool rate_is = settings_.rate_numerator_hz == 0 ||
+                         std::uint64_t{rate.ticks_per_frame} * settings_.rate_numerator_hz ==
+                             std::uint64_t{rate.tick_hz} * settings_.rate_denominator;
+    return rate_is && (settings_.oversampling == 0 || settings_.oversampling == rate.oversampling);
+  }
+
+  /// A board that was without power is as it was made: from now on it is set as it was when it was opened
+  /// first, or the run would go on with another filter.
+  void demand(const trw_rate& rate) {
+    settings_.rate_numerator_hz = rate.tick_hz;
+    settings_.rate_denominator = rate.ticks_per_frame;
+    settings_.oversampling = rate.oversampling;
+  }
+
+  bool configure(const trw_rate& now, std::string& why) {
+    trw_rate_wish wish{now.tick_hz, now.ticks_per_frame, now.oversampling};
     if (settings_.rate_numerator_hz != 0) {
       wish.numerator_hz = settings_.rate_numerator_hz;
       wish.denominator = settings_.rate_denominator;
     }
     if (settings_.oversampling != 0) wish.oversampling = settings_.oversampling;
+    if (!board_->stop()) {
+      why = "the board does not answer";
+      return false;
+    }
     if (board_->set_rate(wish)) return true;
     why = fmt::format(
         "the board refuses {}/{} Hz with {} conversions per frame; its clock of {} Hz must make the rate "
         "exactly, and its converter keep up",
-        wish.numerator_hz, wish.denominator, wish.oversampling, now->tick_hz);
+        wish.numerator_hz, wish.denominator, wish.oversampling, now.tick_hz);
     return false;
   }
 
   std::string name_;
   UsbSourceSettings settings_;
+  BoardInUse board_in_use_;
   std::shared_ptr<UsbBus> bus_;
   std::unique_ptr<UsbBoard> board_;
   std::unique_ptr<UsbStream> stream_;

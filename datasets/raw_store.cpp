@@ -26,8 +26,8 @@ void write_ledger(const Database& database, std::int64_t raw_run, const Ledger& 
       "frames_duplicate, "
       "frames_late, packets_corrupt, bytes_skipped, frames_overrun, frames_adc_error, reboots, silences, "
       "boot_id, first_sequence, board_rate_hz, rate_interval_hz, drift_ppm_h, drift_interval_ppm_h, "
-      "end_reason, source, frames_clipped, frames_test_pattern, board_serial) "
-      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
+      "end_reason, source, frames_clipped, frames_test_pattern, board_serial, conversions_per_frame) "
+      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
       .bind(raw_run)
       .bind(as_sql(ledger.frames_emitted))
       .bind(as_sql(ledger.frames_stored))
@@ -51,6 +51,7 @@ void write_ledger(const Database& database, std::int64_t raw_run, const Ledger& 
       .bind(as_sql(ledger.frames_clipped))
       .bind(as_sql(ledger.frames_test_pattern))
       .bind(ledger.board_serial)
+      .bind(std::int64_t{ledger.conversions_per_frame})
       .run();
 }
 
@@ -218,7 +219,7 @@ std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run) 
           "ledgers "
           "WHERE raw_run = ?",
           version >= 2 ? "frames_clipped, frames_test_pattern" : "0, 0",
-          version >= 3 ? "board_serial" : "''"));
+          version >= 3 ? "board_serial, conversions_per_frame" : "'', 0"));
   select.bind(raw_run);
   if (!select.step()) return {};
   return Ledger{.frames_emitted = from_sql(select.integer(0)),
@@ -242,7 +243,8 @@ std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run) 
                 .drift_interval_ppm_h = select.maybe_real(16),
                 .end_reason = select.text(17),
                 .source = select.text(18),
-                .board_serial = select.text(21)};
+                .board_serial = select.text(21),
+                .conversions_per_frame = static_cast<std::uint32_t>(select.integer(22))};
 }
 
 void read_raw(const CampaignFile& file, const RawRun& run, FrameSink& sink) {

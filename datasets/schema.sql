@@ -137,5 +137,6 @@ ALTER TABLE ledgers ADD COLUMN frames_test_pattern INTEGER NOT NULL DEFAULT 0;
 
 -- @version 3
 
--- The board that was recorded, where its source knows: its serial number.
+-- The board that was recorded, where its source knows: its serial number, and of how many conversions it made a frame.
 ALTER TABLE ledgers ADD COLUMN board_serial TEXT NOT NULL DEFAULT '';
+ALTER TABLE ledgers ADD COLUMN conversions_per_frame INTEGER NOT NULL DEFAULT 0;

@@ -157,12 +157,16 @@ TEST_F(RawStore, FlagsAndBoardAreKeptAndAFileFromBeforeThemIsStillRead) {
                                             .frames_clipped = 40,
                                             .frames_test_pattern = 50,
                                             .source = "tcp:x",
-                                            .board_serial = "5A5B"});
+                                            .board_serial = "5A5B",
+                                            .conversions_per_frame = 8});
   const std::int64_t id = raw_run(file, "R1")->id;
   EXPECT_EQ(ledger_of(file, id)->frames_clipped, 40u);
   EXPECT_EQ(ledger_of(file, id)->frames_test_pattern, 50u);
   EXPECT_EQ(ledger_of(file, id)->board_serial, "5A5B");
-  file.database().execute("ALTER TABLE ledgers DROP COLUMN board_serial; PRAGMA user_version = 2");
+  EXPECT_EQ(ledger_of(file, id)->conversions_per_frame, 8u);
+  file.database().execute(
+      "ALTER TABLE ledgers DROP COLUMN board_serial; ALTER TABLE ledgers DROP COLUMN conversions_per_frame;"
+      "PRAGMA user_version = 2");
   EXPECT_EQ(ledger_of(file, id)->frames_clipped, 40u);
   EXPECT_EQ(ledger_of(file, id)->board_serial, "");
   file.database().execute(

@@ -127,6 +127,29 @@ TEST(Usb, APulledCableIsAGapAndTheRunGoesOn) {
   expect_every_frame_in_its_place(logged);
 }
 
+TEST(Usb, ABoardThatWasWithoutPowerIsSetAsItWas) {
+  Rig rig(Pace::kRig);
+  open_source("usb:,rate=1000,oversampling=8").reset();
+  const auto source = open_source("usb");  // by a later program, as the board is set
+  std::atomic<bool> streaming{false};
+  std::thread operator_thread([&] {
+    EXPECT_TRUE(wait_for(10, [&] { return streaming.load(); }));
+    rig.bus.unplug();
+    rig.bus.with_board([](simulated::Board& board) { board.power_cycle(); });
+    rig.bus.plug();
+  });
+  const auto progress = [&](const LogProgress& now) { streaming = now.ledger->frames_stored > 0; };
+  const Logged logged = log_usb(*source, 2, progress);
+  operator_thread.join();
+  EXPECT_EQ(logged.outcome.state, RunState::kComplete) << logged.outcome.ledger.end_reason;
+  EXPECT_EQ(logged.outcome.ledger.reboots, 1u);
+  EXPECT_EQ(logged.outcome.ledger.conversions_per_frame, 8u);
+  rig.bus.with_board([](simulated::Board& board) {
+    EXPECT_EQ(board.core.rate.oversampling, 8u);
+    EXPECT_EQ(board.core.rate.ticks_per_frame, 84000u);
+  });
+}
+
 TEST(Usb, AnotherBoardInItsPlaceIsNotTheRuns) {
   Rig rig(Pace::kRig);
   const auto source = open_source("usb");  // whichever there is
