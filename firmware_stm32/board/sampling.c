@@ -8,7 +8,9 @@ enum {
   kPolls = 10000,
   kSampleTime = 4,  /* 84 cycles of 21 MHz, 4 us: a source of 1 kOhm and 10 nF settles to 12 bits */
   kTriggerTim2 = 6, /* table 69: TIM2_TRGO */
-  kErrors = BIT(0) | BIT(2) | BIT(3), /* FIFO, direct mode, transfer error of stream 0 */
+  /* Direct mode and transfer error of stream 0. Not the FIFO's: in direct mode it tells of a memory bus that
+   * was busy, the stream stays on and no data are lost (10.3.18); what is lost is the converter's overrun. */
+  kErrors = BIT(2) | BIT(3),
   kComplete = BIT(5),
   kInterrupts = BIT(4) | BIT(2) | BIT(1), /* of DMA2_S0CR: completion, transfer and direct mode error */
   kOverrun = BIT(5),                      /* of ADC_SR */

@@ -74,13 +74,18 @@ TEST(Sampling, BuffersComeInTurnAndErrorsStartAnew) {
   EXPECT_NE(first, second);
   CLEAR(DMA2_S0CR, BIT(19));  // and again the same: one was overwritten before anybody came
   EXPECT_EQ(sampling_take(&third), SAMPLING_ERROR);
-  for (const std::uint32_t error : {BIT(0), BIT(2), BIT(3)}) {
+  for (const std::uint32_t error : {BIT(2), BIT(3)}) {
     model.values[DMA2_LISR] = error;
     model.writes.clear();
     EXPECT_EQ(sampling_take(&third), SAMPLING_ERROR);
     EXPECT_LT(model.first_with(DMA2_S0CR, BIT(0) | BIT(18)), model.last_with(ADC_CR2, BIT(0)));
     EXPECT_EQ(model.last_with(TIM2 + TIM_CR1, 0), -1) << "the timer runs on: time is not lost";
   }
+  model.values[DMA2_LISR] = BIT(0);
+  model.writes.clear();
+  EXPECT_EQ(sampling_take(&third), SAMPLING_NOTHING) << "10.3.18: in direct mode no data are lost";
+  EXPECT_EQ(model.writes, (std::vector<RegisterModel::Write>{{DMA2_LIFCR, BIT(0)}}))
+      << "cleared, and no more";
   model.values[DMA2_LISR] = 0;
   model.values[ADC_SR] = BIT(5);
   EXPECT_EQ(sampling_take(&third), SAMPLING_ERROR);
@@ -206,6 +211,20 @@ TEST_F(SamplingRuns, AnErrorStartsBothAnewWithOneInterrupt) {
   hardware.fill_buffer();
   EXPECT_EQ(core.ring.head, 2u);
   EXPECT_EQ(core.slots[1].frame.status & TRW_STATUS_ADC_ERROR, TRW_STATUS_ADC_ERROR);
+}
+
+TEST_F(SamplingRuns, AConverterThatOnlyErrsMakesNoFrames) {
+  board_start(&core, false);
+  pass(2);
+  EXPECT_EQ(board_frames_made(&core), 2u);
+  for (int i = 0; i < 3; ++i) {
+    now_ticks += core.rate.ticks_per_frame;
+    hardware.overrun();
+  }
+  EXPECT_EQ(core.sequence, 5u);
+  EXPECT_EQ(board_frames_made(&core), 2u) << "by which the watchdog is fed";
+  pass(BOARD_RING_FRAMES);
+  EXPECT_EQ(board_frames_made(&core), 2u + BOARD_RING_FRAMES) << "those that found the ring full as well";
 }
 
 TEST_F(SamplingRuns, WhatOneRunLeftPendingIsNotTheNextOnes) {
