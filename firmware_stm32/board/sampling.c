@@ -6,7 +6,7 @@
 
 enum {
   kPolls = 10000,
-  kSampleTime = 4,  /* 84 cycles of 21 MHz, 4 us: a source of 1 kOhm and 10 nF settles to 12 bits */
+  kSampleTime = 4,  /* 84 cycles of 21 MHz, 4 us: enough for a pin with 33 nF behind 1 kOhm */
   kTriggerTim2 = 6, /* table 69: TIM2_TRGO */
   /* Direct mode and transfer error of stream 0. Not the FIFO's: in direct mode it tells of a memory bus that
    * was busy, the stream stays on and no data are lost (10.3.18); what is lost is the converter's overrun. */
