@@ -13,13 +13,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include <fcntl.h>
 #include <linux/usbdevice_fs.h>
 #include <pthread.h>
 #include <sys/ioctl.h>
-#include <sys/stat.h>
 #include <umockdev.h>
-#include <unistd.h>
 
 namespace tunnelrig::simulated {
 namespace {
@@ -53,6 +50,7 @@ UsbBus::UsbBus(Board& board, Pace pace)
     : board_(board), pace_(pace), handler_(umockdev_ioctl_base_new()), number_(1) {
   testbed();
   g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(on_ioctl), this);
+  g_signal_connect(handler_, "client-vanished", G_CALLBACK(on_close), this);
   worker_ = std::thread([this] { work(); });
 }
 
@@ -68,26 +66,6 @@ UsbBus::~UsbBus() {
   worker_.join();
   if (plugged) unplug();
   g_object_unref(handler_);
-  if (gate_ >= 0) ::close(gate_);
-}
-
-/// A regular file is always ready to poll(), and libusb would spin; a FIFO is ready when we say so.
-void UsbBus::replace_node_by_gate() {
-  char* root = umockdev_testbed_get_root_dir(testbed());
-  const std::string path = root + node_;
-  g_free(root);
-  ::unlink(path.c_str());
-  umockdev_testbed_disable(testbed());
-  const bool made = ::mkfifo(path.c_str(), 0666) == 0;
-  const int gate = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-  umockdev_testbed_enable(testbed());
-  require(made && gate >= 0, nullptr);
-  ::fcntl(gate, F_SETPIPE_SZ, 4096);  // one page: quickly filled and drained
-  const std::lock_guard lock(mutex_);
-  if (gate_ >= 0) ::close(gate_);
-  gate_ = gate;
-  gate_full_ = false;
-  show_ready(false);
 }
 
 void UsbBus::plug() {
@@ -108,9 +86,15 @@ void UsbBus::plug() {
   GError* error = nullptr;
   require(umockdev_testbed_add_from_string(testbed(), text.c_str(), &error) != 0, error);
   require(umockdev_testbed_attach_ioctl(testbed(), node_.c_str(), handler_, &error) != 0, error);
-  replace_node_by_gate();
+  char* root = umockdev_testbed_get_root_dir(testbed());
+  const std::string path = root + node_;
+  g_free(root);
   {
     const std::lock_guard lock(mutex_);
+    umockdev_testbed_disable(testbed());
+    const bool made = gate_.make(path);
+    umockdev_testbed_enable(testbed());
+    require(made, nullptr);
     gone_ = false;
   }
   umockdev_testbed_uevent(testbed(), kSysPath, "add");
@@ -126,7 +110,8 @@ void UsbBus::unplug() {
       complete(urb, -ESHUTDOWN);
     }
     cancelled_.clear();
-    show_ready(true);
+    claimed_by_ = nullptr;
+    gate_.show(true);
     board_.controller.reset();
   }
   umockdev_testbed_uevent(testbed(), kSysPath, "remove");
@@ -175,23 +160,10 @@ double UsbBus::processor_s() {
 
 // --- everything below with the lock held, but for work() and on_ioctl()
 
-void UsbBus::show_ready(bool ready) {
-  if (gate_ < 0 || ready != gate_full_) return;  // a full FIFO is not writable: nothing to reap
-  std::array<char, 4096> bytes{};
-  if (ready) {
-    while (::read(gate_, bytes.data(), bytes.size()) > 0) {
-    }
-  } else {
-    while (::write(gate_, bytes.data(), bytes.size()) > 0) {
-    }
-  }
-  gate_full_ = !ready;
-}
-
 void UsbBus::complete(usbdevfs_urb* urb, int status) {
   urb->status = status;
   done_[number_].push_back(urb);
-  show_ready(true);
+  gate_.show(true);
 }
 
 /// Moves packets into `urb`; true where it is finished, with its status.
@@ -332,16 +304,32 @@ long UsbBus::reap(void** urb, int number, bool dead, int& error) {
   std::deque<usbdevfs_urb*>& done = done_[number];
   if (done.empty()) {
     error = dead ? ENODEV : EAGAIN;
-    if (!dead) show_ready(false);
+    if (!dead) gate_.show(false);
     return -1;
   }
   *urb = done.front();
   done.pop_front();
-  if (done.empty() && !dead) show_ready(false);
+  if (done.empty() && !dead) gate_.show(false);
   return 0;
 }
 
-long UsbBus::ioctl(unsigned long request, void* argument, int number, int& error) {
+/// As a kernel does: of one opened file, until that is closed.
+long UsbBus::claim(const void* file, int& error) {
+  if (claimed_by_ != nullptr && claimed_by_ != file) {
+    error = EBUSY;
+    return -1;
+  }
+  claimed_by_ = file;
+  return 0;
+}
+
+void UsbBus::on_close(_UMockdevIoctlBase* /*base*/, _UMockdevIoctlClient* file, void* context) {
+  auto& self = *static_cast<UsbBus*>(context);
+  const std::lock_guard lock(self.mutex_);
+  if (self.claimed_by_ == file) self.claimed_by_ = nullptr;
+}
+
+long UsbBus::ioctl(unsigned long request, void* argument, const void* file, int number, int& error) {
   const bool dead = gone_ || number != number_;
   if (request == static_cast<unsigned>(USBDEVFS_REAPURBNDELAY))
     return reap(static_cast<void**>(argument), number, dead, error);
@@ -360,7 +348,9 @@ long UsbBus::ioctl(unsigned long request, void* argument, int number, int& error
     case static_cast<unsigned>(USBDEVFS_SUBMITURB):
       return submit(static_cast<usbdevfs_urb*>(argument));
     case static_cast<unsigned>(USBDEVFS_CLAIMINTERFACE):
+      return claim(file, error);
     case static_cast<unsigned>(USBDEVFS_RELEASEINTERFACE):
+      if (claimed_by_ == file) claimed_by_ = nullptr;
       return 0;
     case static_cast<unsigned>(USBDEVFS_CLEAR_HALT):
       board_.control(0x02, 1, 0, static_cast<std::uint16_t>(*static_cast<unsigned*>(argument)), 0, nullptr);
@@ -380,7 +370,7 @@ int UsbBus::on_ioctl(_UMockdevIoctlBase* /*base*/, _UMockdevIoctlClient* client,
   long result = 0;
   {
     const std::lock_guard lock(self.mutex_);
-    result = self.ioctl(request, argument, number, error);
+    result = self.ioctl(request, argument, client, number, error);
     self.ioctl_processor_s_ = seconds_of(CLOCK_THREAD_CPUTIME_ID);
   }
   umockdev_ioctl_client_complete(client, result, error);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "simulated/board.h"
+#include "simulated/gate.h"
 
 #include <atomic>
 #include <condition_variable>
@@ -63,15 +64,15 @@ class UsbBus {
   int service(int budget);
   bool fill(usbdevfs_urb& urb, int& budget, int& status);
   void complete(usbdevfs_urb* urb, int status);
-  void show_ready(bool ready);
-  void replace_node_by_gate();
-  long ioctl(unsigned long request, void* argument, int number, int& error);
+  long ioctl(unsigned long request, void* argument, const void* file, int number, int& error);
+  long claim(const void* file, int& error);
   long reap(void** urb, int number, bool dead, int& error);
   long submit(usbdevfs_urb* urb);
   void answer(usbdevfs_urb* urb);
   bool cancel(usbdevfs_urb* urb);
   long discard(usbdevfs_urb* urb, int& error);
   static int on_ioctl(_UMockdevIoctlBase*, _UMockdevIoctlClient* client, void* self);
+  static void on_close(_UMockdevIoctlBase*, _UMockdevIoctlClient* file, void* self);
 
   Board& board_;
   Pace pace_;
@@ -86,8 +87,8 @@ class UsbBus {
   bool mangled_end_ = false;  // a short packet stands at their end
   Mangle mangle_;
   bool gone_ = true, deaf_ = false, quit_ = false;
-  int gate_ = -1;
-  bool gate_full_ = false;
+  Gate gate_;
+  const void* claimed_by_ = nullptr;
   int number_;
   double clock_s_ = 0;
   double ioctl_processor_s_ = 0;

@@ -59,7 +59,8 @@ TEST(Usb, AStopThatIsNotAnsweredBeginsTheRunAllTheSame) {
   std::this_thread::sleep_for(100ms);
   rig.bus.set_deaf(true);
   std::thread troublemaker([&] {
-    std::this_thread::sleep_for(400ms);  // longer than any answer is waited for
+    // Longer than *stop* is waited for, and until the device is given up: it has to be closed later.
+    std::this_thread::sleep_for(700ms);
     rig.bus.set_deaf(false);
   });
   expect_a_run_of_its_own(*source, rig);
