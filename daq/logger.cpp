@@ -3,6 +3,7 @@
 #include "daq/block_queue.h"
 #include "daq/loss_ledger.h"
 #include "daq/packet_decoder.h"
+#include "daq/watchdog.h"
 #include "datasets/error.h"
 #include "datasets/statistics_store.h"
 
@@ -146,44 +147,6 @@ class TrackerSink : public PacketSink {
   const PacketSource& source_;
   ClockFit clock_;
   double packet_s_, time_s_ = 0;
-};
-
-/// Notices that no new frame comes, by the source's own clock (the virtual rig's runs faster than ours).
-class Watchdog {
- public:
-  enum class Verdict { kFine, kBecameSilent, kStillSilent, kGiveUp };
-
-  Watchdog(double silence_s, double give_up_s) : silence_s_(silence_s), give_up_s_(give_up_s) {}
-
-  /// A slow board is not a silent one: three of its packets.
-  Verdict look(std::uint64_t frames, double time_s, double packet_s) {
-    const double silence_s = std::max(silence_s_, 3 * packet_s);
-    if (!started_ || frames != frames_) {
-      started_ = true;
-      silent_ = false;
-      patience_ = 1;
-      frames_ = frames;
-      since_s_ = time_s;
-      next_alarm_s_ = time_s + silence_s;
-      return Verdict::kFine;
-    }
-    if (time_s - since_s_ >= give_up_s_) return Verdict::kGiveUp;
-    if (time_s < next_alarm_s_) return Verdict::kFine;
-    patience_ = std::min(2 * patience_, kMostPatience);
-    next_alarm_s_ = time_s + patience_ * silence_s;
-    return std::exchange(silent_, true) ? Verdict::kStillSilent : Verdict::kBecameSilent;
-  }
-
-  bool silent() const { return silent_; }
-
- private:
-  // A board that starts anew when it is opened must come to its first packet before it is opened again.
-  static constexpr double kMostPatience = 4;
-
-  double silence_s_, give_up_s_, patience_ = 1;
-  bool started_ = false, silent_ = false;
-  std::uint64_t frames_ = 0;
-  double since_s_ = 0, next_alarm_s_ = 0;
 };
 
 /// What arrived between two ledgers that brought no new frame; empty where it is nothing.
@@ -367,10 +330,21 @@ LogOutcome log_run(PacketSource& source, CampaignFile& file, const RunCells& run
   const CampaignInfo info = file.info();
   const auto summarizer = summarizer_factory(info, RawFormat{});
   std::optional<Recording> recording;
-  file.atomically([&] {
+  const auto begin = [&] {
     file.append_row("runs", run);
     recording.emplace(file, name_of_run(run), info, settings, *summarizer, source);
-  });
+  };
+  const Ledger nothing_yet;
+  for (auto next = Clock::now() + kHeldUp; !file.atomically_if_free(begin);) {
+    if (stop)
+      throw InputError(fmt::format(
+          "{}: another program is writing to it; the run was stopped before it began", file.path().string()));
+    if (progress && Clock::now() >= next) {
+      progress({.duration_s = settings.duration_s, .waiting = true, .held_up = true, .ledger = &nothing_yet});
+      next = Clock::now() + kProgressInterval;
+    }
+    std::this_thread::sleep_for(kTick);
+  }
   std::string end_reason;
   {
     BlockQueue queue(kQueueLimit);
