@@ -123,6 +123,8 @@ int run_log(const LogOptions& options, const CLI::App& verb) {
   const std::set<std::string> before = runs_in(options.db);
   std::signal(SIGINT, stop_on_signal);
   std::signal(SIGTERM, stop_on_signal);
+  // The terminal is closed, or the SSH connection is gone; nohup asked not to mind.
+  if (std::signal(SIGHUP, stop_on_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);  // whoever reads --capture by a pipe may end before the recording does
   try {
     if (options.live_port) return run_live(options);

@@ -50,11 +50,11 @@ class LiveLogging {
     if (!plan_.empty())
       fmt::print("{}: {} of {} runs to record\n", options_.plan, left_.size(), plan_.size());
     std::fflush(stdout);
-    if (!options_.location.empty()) record(asked_on_the_command_line(), nullptr);
+    if (!options_.location.empty()) record_unasked(asked_on_the_command_line());
     while (!quit_requested) {
       if (!left_.empty() && may_go_on()) {
         const PlannedRun next = left_.front();
-        record(next, nullptr);
+        record_unasked(next);
         if (options_.yes) have_tried(next);
         continue;
       }
@@ -118,6 +118,20 @@ class LiveLogging {
       }
     } catch (const InputError& error) {
       order.answer({.problem = error.what(), .text = ""});
+    } catch (const StorageError& error) {
+      if (error.disk_full()) throw;
+      warn(error.what());
+      order.answer({.problem = error.what(), .text = ""});
+    }
+  }
+
+  /// A run that nobody's command is waiting for.
+  void record_unasked(const PlannedRun& planned) {
+    try {
+      record(planned, nullptr);
+    } catch (const InputError& error) {
+      warn(error.what());
+      code_ = std::max<int>(code_, kProblemFound);
     }
   }
 
@@ -224,15 +238,15 @@ class LiveLogging {
         .progress =
             [&](const LogProgress& progress) {
               page_.feed().progress(progress);
-              if (std::exchange(begun, true)) return;
+              if (progress.waiting || std::exchange(begun, true)) return;
               page_.book().look();  // its row is in the file now
               if (order != nullptr)
                 order->answer({.problem = "", .text = fmt::format("{} is being recorded", here_.run)});
             },
         .ended =
-            [&](const std::string& run, const LogOutcome& outcome) {
+            [&](const LogOutcome& outcome) {
               complete_ = outcome.state == RunState::kComplete;
-              mark_alarms(logging_.file(), run, page_.feed().end(outcome));
+              return page_.feed().end(outcome);
             }};
     placed_.reset();
     code_ = std::max(code_, logging_.record(planned, "", watch));

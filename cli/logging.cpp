@@ -17,6 +17,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <set>
+#include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -25,6 +27,8 @@ namespace tunnelrig::cli {
 std::atomic<bool> stop_requested{false}, quit_requested{false};
 
 namespace {
+
+constexpr int kMarkPause_ms = 20;
 
 /// Text of a number as it goes into a cell.
 std::string cell(double value) { return fmt::format("{}", value); }
@@ -129,10 +133,7 @@ int Logging::record(const PlannedRun& planned, const std::string& note, const Lo
   if (!options_.capture.empty() && !capture_.is_open()) capture_ = open_to_write(options_.capture);
   const LogOutcome outcome = log(board ? *board : *source_, row(name, planned, start_s), planned.duration_s,
                                  note.empty() ? name : note, watch);
-  if (watch.ended)
-    watch.ended(name, outcome);
-  else
-    mark_alarms(file_, name, alarms(planned, outcome));
+  mark(name, watch.ended ? watch.ended(outcome) : alarms(planned, outcome));
   print(name, planned, outcome);
   const int code = warn_of_run(name, outcome, info_) ? kProblemFound : kWell;
   if (capture_) return code;
@@ -202,6 +203,22 @@ std::string Logging::alarms(const PlannedRun& planned, const LogOutcome& outcome
   return live::alarms_of(outcome, scale, info_, "");
 }
 
+/// A run that is in the file is worth more than its marks: whoever asks to stop does not wait for them.
+void Logging::mark(const std::string& name, const std::string& alarms) {
+  bool told = false;
+  while (!mark_alarms(file_, name, alarms)) {
+    if (quit_requested) {
+      warn(fmt::format("run {} is not marked with its alarms ({}): another program is writing to {}", name,
+                       alarms.empty() ? "none" : alarms, options_.db));
+      return;
+    }
+    if (!std::exchange(told, true))
+      warn(fmt::format("another program is writing to {}; run {} is marked with its alarms once it has ended",
+                       options_.db, name));
+    std::this_thread::sleep_for(std::chrono::milliseconds(kMarkPause_ms));
+  }
+}
+
 double Logging::pace() const {
   if (options_.pace == "max") return 0;
   const auto value = parse_number(options_.pace);
@@ -253,10 +270,11 @@ void Logging::show(ProgressBar& bar, const LogProgress& progress) const {
   bar.show(progress.elapsed_s, progress.duration_s,
            fmt::format("{} frames, {} lost, {}{}", progress.ledger->frames_stored,
                        progress.ledger->frames_lost, means_text(volts),
-                       progress.held_up           ? ", ANOTHER PROGRAM HOLDS THE FILE"
-                       : !progress.silent         ? ""
-                       : progress.instead.empty() ? ", SILENT"
-                                                  : fmt::format(", ONLY {}", progress.instead)));
+                       progress.held_up            ? ", ANOTHER PROGRAM HOLDS THE FILE"
+                       : !progress.silent          ? ""
+                       : !progress.problem.empty() ? fmt::format(", SILENT: {}", progress.problem)
+                       : progress.instead.empty()  ? ", SILENT"
+                                                   : fmt::format(", ONLY {}", progress.instead)));
 }
 
 void Logging::print(const std::string& name, const PlannedRun& planned, const LogOutcome& outcome) const {

@@ -54,10 +54,11 @@ extern std::atomic<bool> stop_requested, quit_requested;
 
 /// What is told of a run to whoever watches it.
 struct LogWatch {
-  FrameSink* frames = nullptr;                                           // as LogSettings::watcher
-  std::function<void(const RunCells&)> begun;                            // before its first frame
-  std::function<void(const LogProgress&)> progress;                      // several times a second
-  std::function<void(const std::string& run, const LogOutcome&)> ended;  // before the next can begin
+  FrameSink* frames = nullptr;                       // as LogSettings::watcher
+  std::function<void(const RunCells&)> begun;        // before its first frame
+  std::function<void(const LogProgress&)> progress;  // several times a second
+  /// Before the next can begin; the alarms that the run had.
+  std::function<std::string(const LogOutcome&)> ended;
 };
 
 /// The recorder's side of the verb.
@@ -85,6 +86,7 @@ class Logging {
  private:
   double pace() const;
   std::string alarms(const PlannedRun& planned, const LogOutcome& outcome);
+  void mark(const std::string& name, const std::string& alarms);
   void doubt_place(const PlannedRun& planned);
   void add_conditions(const std::optional<InstrumentReadings>& shown, RunKind kind);
   std::string means_text(const std::array<double, 4>& volts) const;

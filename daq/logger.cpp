@@ -3,6 +3,7 @@
 #include "daq/block_queue.h"
 #include "daq/loss_ledger.h"
 #include "daq/packet_decoder.h"
+#include "daq/watchdog.h"
 #include "datasets/error.h"
 #include "datasets/statistics_store.h"
 
@@ -117,10 +118,15 @@ class RunSink : public FrameSink {
 class TrackerSink : public PacketSink {
  public:
   /// Before the first packet the longest that there may be is waited for.
-  TrackerSink(LossTracker& tracker, FrameSink& sink, double rate_hz)
-      : tracker_(tracker), sink_(sink), packet_s_(static_cast<double>(TRW_MAX_FRAMES) / rate_hz) {}
+  TrackerSink(LossTracker& tracker, FrameSink& sink, double rate_hz, const PacketSource& source)
+      : tracker_(tracker),
+        sink_(sink),
+        source_(source),
+        packet_s_(static_cast<double>(TRW_MAX_FRAMES) / rate_hz) {}
   void packet(const Packet& packet) override {
     const trw_header& header = packet.header;
+    const auto run = source_.boundary();
+    if (run && header.boot_id == run->boot_id && header.first_sequence < run->first_sequence) return;
     const std::uint64_t stored = tracker_.ledger().frames_stored;
     tracker_.take(packet, time_s_, sink_);
     // What brings nothing new may be of another boot. A board may start again without a new id.
@@ -138,46 +144,9 @@ class TrackerSink : public PacketSink {
  private:
   LossTracker& tracker_;
   FrameSink& sink_;
+  const PacketSource& source_;
   ClockFit clock_;
   double packet_s_, time_s_ = 0;
-};
-
-/// Notices that no new frame comes, by the source's own clock (the virtual rig's runs faster than ours).
-class Watchdog {
- public:
-  enum class Verdict { kFine, kBecameSilent, kStillSilent, kGiveUp };
-
-  Watchdog(double silence_s, double give_up_s) : silence_s_(silence_s), give_up_s_(give_up_s) {}
-
-  /// A slow board is not a silent one: three of its packets.
-  Verdict look(std::uint64_t frames, double time_s, double packet_s) {
-    const double silence_s = std::max(silence_s_, 3 * packet_s);
-    if (!started_ || frames != frames_) {
-      started_ = true;
-      silent_ = false;
-      patience_ = 1;
-      frames_ = frames;
-      since_s_ = time_s;
-      next_alarm_s_ = time_s + silence_s;
-      return Verdict::kFine;
-    }
-    if (time_s - since_s_ >= give_up_s_) return Verdict::kGiveUp;
-    if (time_s < next_alarm_s_) return Verdict::kFine;
-    patience_ = std::min(2 * patience_, kMostPatience);
-    next_alarm_s_ = time_s + patience_ * silence_s;
-    return std::exchange(silent_, true) ? Verdict::kStillSilent : Verdict::kBecameSilent;
-  }
-
-  bool silent() const { return silent_; }
-
- private:
-  // A board that starts anew when it is opened must come to its first packet before it is opened again.
-  static constexpr double kMostPatience = 4;
-
-  double silence_s_, give_up_s_, patience_ = 1;
-  bool started_ = false, silent_ = false;
-  std::uint64_t frames_ = 0;
-  double since_s_ = 0, next_alarm_s_ = 0;
 };
 
 /// What arrived between two ledgers that brought no new frame; empty where it is nothing.
@@ -203,7 +172,7 @@ class Recording {
         file_(file),
         writer_(file, run, RawFormat{}, static_cast<std::size_t>(kChunk_s * info.daq.sample_rate_hz)),
         sink_(writer_, summarizer, settings.watcher),
-        packets_(tracker_, sink_, info.daq.sample_rate_hz),
+        packets_(tracker_, sink_, info.daq.sample_rate_hz, source),
         watchdog_(settings.silence_s, settings.give_up_s),
         source_(source) {}
 
@@ -262,6 +231,7 @@ class Recording {
               .duration_s = settings_.duration_s,
               .silent = watchdog_.silent(),
               .instead = watchdog_.silent() ? unusable_between(at_last_frame_, now) : "",
+              .problem = watchdog_.silent() ? source_.problem() : "",
               .held_up = Clock::now() - oldest_pending_ > kHeldUp,
               .mean_counts = sink_.means(),
               .ledger = &now,
@@ -298,9 +268,9 @@ class Recording {
   }
 
   std::string reason_to_give_up() const {
-    const std::string instead = unusable_between(at_last_frame_, ledger());
-    return fmt::format("no {}frame for {:g} s{}", instead.empty() ? "" : "new ", settings_.give_up_s,
-                       instead.empty() ? "" : ", only " + instead);
+    const std::string instead = unusable_between(at_last_frame_, ledger()), problem = source_.problem();
+    return fmt::format("no {}frame for {:g} s{}{}", instead.empty() ? "" : "new ", settings_.give_up_s,
+                       instead.empty() ? "" : ", only " + instead, problem.empty() ? "" : ": " + problem);
   }
 
   Ledger ledger() const {
@@ -310,6 +280,10 @@ class Recording {
     ledger.silences = silences_;
     ledger.end_reason = end_reason_;
     ledger.source = source_.name();
+    if (const auto board = source_.board()) {
+      ledger.board_serial = board->serial;
+      ledger.conversions_per_frame = board->conversions_per_frame;
+    }
     return ledger;
   }
 
@@ -356,10 +330,21 @@ LogOutcome log_run(PacketSource& source, CampaignFile& file, const RunCells& run
   const CampaignInfo info = file.info();
   const auto summarizer = summarizer_factory(info, RawFormat{});
   std::optional<Recording> recording;
-  file.atomically([&] {
+  const auto begin = [&] {
     file.append_row("runs", run);
     recording.emplace(file, name_of_run(run), info, settings, *summarizer, source);
-  });
+  };
+  const Ledger nothing_yet;
+  for (auto next = Clock::now() + kHeldUp; !file.atomically_if_free(begin);) {
+    if (stop)
+      throw InputError(fmt::format(
+          "{}: another program is writing to it; the run was stopped before it began", file.path().string()));
+    if (progress && Clock::now() >= next) {
+      progress({.duration_s = settings.duration_s, .waiting = true, .held_up = true, .ledger = &nothing_yet});
+      next = Clock::now() + kProgressInterval;
+    }
+    std::this_thread::sleep_for(kTick);
+  }
   std::string end_reason;
   {
     BlockQueue queue(kQueueLimit);

@@ -43,6 +43,8 @@ struct LogProgress {
   double duration_s = 0;
   bool silent = false;
   std::string instead;   // where silent: what arrives all the same and cannot be used; else empty
+  std::string problem;   // where silent: why the board cannot be had, where its source says so
+  bool waiting = false;  // to begin: another program is writing to the file, which has not got the run yet
   bool held_up = false;  // another program has been writing to the file for a while: the frames wait here
   std::array<double, 4> mean_counts{};  // of the frames so far
   const Ledger* ledger = nullptr;
@@ -64,9 +66,9 @@ using RunCells = std::vector<std::pair<std::string, std::string>>;
 /// durable within settings.commit_interval; statistics and state at the end. `progress` is called several
 /// times a second, `stop` ends the run early (state partial).
 ///
-/// While another program writes to the file, frames wait in memory (38 MB an hour), and so does the end of
-/// the run. Throws InputError where the run exists, StorageError where the disk is full or fails: everything
-/// committed before stays.
+/// While another program writes to the file, the run's begin waits, frames wait in memory (38 MB an hour),
+/// and so does the end of the run. Throws InputError where the run exists or was stopped before it could
+/// begin, StorageError where the disk is full or fails: everything committed before stays.
 LogOutcome log_run(PacketSource& source, CampaignFile& file, const RunCells& run, const LogSettings& settings,
                    const SummarizerFactory& summarizer,
                    const std::function<void(const LogProgress&)>& progress, const std::atomic<bool>& stop);

@@ -56,7 +56,7 @@ LossTracker::LossTracker(double duration_s, double expected_rate_hz)
 void LossTracker::start(const trw_header& header) {
   started_ = true;
   boot_id_ = header.boot_id;
-  next_sequence_ = header.first_sequence;
+  oldest_sequence_ = next_sequence_ = header.first_sequence;
   ledger_.boot_id = header.boot_id;
   ledger_.first_sequence = header.first_sequence;
   first_rate_hz_ = rate_of(header);
@@ -93,16 +93,21 @@ void LossTracker::begin_anew(const trw_header& header, double time_s, FrameSink&
   const auto by_clock = static_cast<std::uint64_t>(std::clamp(between, 0.0, 1e15));
   lose(std::max({by_clock, header.first_sequence, std::uint64_t{1}}),
        noted_cause_ != nullptr ? noted_cause_ : "reboot", true, sink);
-  next_sequence_ = header.first_sequence;
+  oldest_sequence_ = next_sequence_ = header.first_sequence;
   lost_ranges_.clear();
   newest_.clear();
   contradiction_end_.reset();
 }
 
-/// Whether a packet's numbers have passed and yet it is no copy of what was stored under them.
-bool LossTracker::contradicts(const Packet& packet) const {
+/// Whether a packet's numbers have passed and yet it is no copy of what was stored under them. Below the
+/// first that was taken there is nothing to hold it against: a board that counts anew has not had the time
+/// for more frames than that, and what a link sends again has a higher number.
+bool LossTracker::contradicts(const Packet& packet, double time_s) const {
   const std::uint64_t first = packet.header.first_sequence;
   if (first >= next_sequence_ || newest_.empty()) return false;
+  if (first + packet.header.frame_count <= oldest_sequence_ &&
+      static_cast<double>(first) <= (time_s - last_time_s_) * first_rate_hz_)
+    return true;
   if (next_sequence_ - first > kRememberedFrames) return true;
   for (std::size_t i = 0; i < packet.header.frame_count; ++i) {
     trw_frame frame;
@@ -123,7 +128,7 @@ bool LossTracker::follow_restart(const Packet& packet, double time_s, FrameSink&
     return true;
   }
   contradiction_end_.reset();
-  if (!contradicts(packet)) return true;
+  if (!contradicts(packet, time_s)) return true;
   contradiction_end_ = first + packet.header.frame_count;
   ++ledger_.packets_corrupt;
   return false;

@@ -53,7 +53,7 @@ class LossTracker {
   void start(const trw_header& header);
   bool follow_boot(const trw_header& header, double time_s, FrameSink& sink);
   bool follow_restart(const Packet& packet, double time_s, FrameSink& sink);
-  bool contradicts(const Packet& packet) const;
+  bool contradicts(const Packet& packet, double time_s) const;
   void begin_anew(const trw_header& header, double time_s, FrameSink& sink);
   void lose(std::uint64_t frames, const char* cause, bool estimated, FrameSink& sink);
   void pass(const Packet& packet, std::size_t first, std::size_t count, FrameSink& sink);
@@ -68,6 +68,7 @@ class LossTracker {
   bool started_ = false;
   std::uint32_t boot_id_ = 0;
   std::vector<std::uint32_t> past_boots_;
+  std::uint64_t oldest_sequence_ = 0;  // of this boot: below it nothing was ever taken
   std::uint64_t next_sequence_ = 0;
   const char* noted_cause_ = nullptr;
   double last_time_s_ = 0;

@@ -26,6 +26,19 @@ struct ReadResult {
       nullptr;  // what went wrong before these bytes: a static text for the gap, if there is one
 };
 
+/// The board behind a source that knows it. The same from the source's first byte to its last: a run of two
+/// boards would be one of two sets of load cells.
+struct BoardInUse {
+  std::string serial;
+  std::uint32_t conversions_per_frame = 0;
+};
+
+/// Where a run begins, on a board that says so: what it sampled under lower numbers of this boot was before.
+struct RunBoundary {
+  std::uint32_t boot_id = 0;
+  std::uint64_t first_sequence = 0;
+};
+
 /// A stream of bytes in which packets stand (docs/wire-format.md). Used by one thread at a time.
 class PacketSource {
  public:
@@ -33,6 +46,10 @@ class PacketSource {
 
   /// A run begins: what waits from before may be thrown away.
   virtual void begin_run() {}
+
+  /// Of the run that has begun, where the source knows. Whoever has got a byte of it may ask, on any thread:
+  /// it is the same until the next run begins.
+  virtual std::optional<RunBoundary> boundary() const { return {}; }
 
   /// Nobody records, and this is called several times a second meanwhile: what has come since is thrown away,
   /// or the next run would begin with it. Does not wait.
@@ -48,6 +65,13 @@ class PacketSource {
   /// The most frames that ever waited on the board, where the source knows. Any thread may ask.
   virtual std::optional<std::uint64_t> ring_frames() const { return {}; }
 
+  /// Any thread may ask.
+  virtual std::optional<BoardInUse> board() const { return {}; }
+
+  /// Why the board cannot be had just now, for people; empty where it can, or nobody knows. Any thread may
+  /// ask.
+  virtual std::string problem() const { return ""; }
+
   /// As the ledger names it: "tcp:localhost:4000". Any thread may ask.
   virtual std::string name() const = 0;
 };
@@ -56,7 +80,8 @@ class PacketSource {
 /// the source and what is wrong with it. (The virtual rig needs more than a name: virtual_rig.h.)
 std::unique_ptr<PacketSource> open_source(const std::string& name);
 
-/// Seconds on the clock of a source that runs in real time.
+/// Seconds on the clock of a source that runs in real time. They pass while the computer sleeps, too: the board
+/// goes on meanwhile, or has been away for so long.
 double steady_seconds();
 
 }  // namespace tunnelrig

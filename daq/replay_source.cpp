@@ -3,6 +3,7 @@
 #include "daq/sources.h"
 #include "datasets/error.h"
 
+#include <ctime>
 #include <fstream>
 #include <utility>
 
@@ -58,7 +59,9 @@ std::unique_ptr<PacketSource> open_source(const std::string& name) {
 }
 
 double steady_seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  timespec now{};
+  ::clock_gettime(CLOCK_BOOTTIME, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 }  // namespace tunnelrig

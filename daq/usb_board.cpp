@@ -98,7 +98,7 @@ std::optional<trw_statistics> UsbBoard::statistics() {
 std::unique_ptr<UsbBoard> UsbBoard::open(const std::shared_ptr<UsbBus>& bus, const std::string& serial,
                                          std::string& why) {
   const Candidates candidates(bus->context());
-  std::vector<std::shared_ptr<UsbHandle>> matching;
+  std::vector<std::unique_ptr<UsbBoard>> matching;
   std::string others;
   why.clear();
   for (libusb_device* device : candidates.devices()) {
@@ -110,7 +110,7 @@ std::unique_ptr<UsbBoard> UsbBoard::open(const std::shared_ptr<UsbBus>& bus, con
     }
     const std::string found = serial_of(*handle);
     if (found.starts_with(serial) && !found.empty())
-      matching.push_back(std::move(handle));
+      matching.emplace_back(new UsbBoard(std::move(handle), found));
     else
       others += (others.empty() ? "" : ", ") + (found.empty() ? "one that does not answer" : found);
   }
@@ -121,10 +121,10 @@ std::unique_ptr<UsbBoard> UsbBoard::open(const std::shared_ptr<UsbBus>& bus, con
   if (matching.empty()) {
     if (why.empty())
       why = others.empty() ? "no board is plugged in"
-                           : fmt::format("no board of that serial number; there are {}", others);
+                           : fmt::format("no board of serial number {}; there are {}", serial, others);
     return nullptr;
   }
-  std::unique_ptr<UsbBoard> board(new UsbBoard(matching.front()));
+  std::unique_ptr<UsbBoard> board = std::move(matching.front());
   const int error = board->handle_->claim(TRW_USB_INTERFACE);
   if (error != 0) {
     why = error == LIBUSB_ERROR_BUSY ? "the board is in use by another program" : usb_error(error);
@@ -155,7 +155,7 @@ std::vector<UsbDevice> list_usb_boards() {
     int error = 0;
     if (auto handle = UsbHandle::open(bus, device, error)) {
       entry.serial = serial_of(*handle);
-      UsbBoard board(std::move(handle));
+      UsbBoard board(std::move(handle), entry.serial);
       if (board.identify()) {
         entry.identity = board.identity();
         entry.rate = board.rate();

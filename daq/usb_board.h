@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace tunnelrig {
@@ -35,6 +36,7 @@ class UsbBoard {
                                         std::string& why);
 
   const trw_identity& identity() const { return identity_; }
+  const std::string& serial() const { return serial_; }
   const std::shared_ptr<UsbHandle>& handle() const { return handle_; }
 
   // Each is one control transfer with a bounded wait; false (or nothing) where the board refuses or does not
@@ -47,12 +49,14 @@ class UsbBoard {
   std::optional<trw_statistics> statistics();
 
  private:
-  explicit UsbBoard(std::shared_ptr<UsbHandle> handle) : handle_(std::move(handle)) {}
+  UsbBoard(std::shared_ptr<UsbHandle> handle, std::string serial)
+      : handle_(std::move(handle)), serial_(std::move(serial)) {}
   bool identify();
   bool command(std::uint8_t request, std::uint16_t value);
   friend std::vector<UsbDevice> list_usb_boards();
 
   std::shared_ptr<UsbHandle> handle_;
+  std::string serial_;
   trw_identity identity_{};
 };
 

@@ -18,6 +18,9 @@ constexpr std::chrono::milliseconds kClearHaltWait{300};
 
 /// What a call that may outlive its caller leaves behind for the callback.
 struct Call {
+  explicit Call(std::shared_ptr<std::atomic<int>> inside) : calls_inside(std::move(inside)) {}
+
+  std::shared_ptr<std::atomic<int>> calls_inside;  // of its handle
   std::mutex mutex;
   std::condition_variable changed;
   bool done = false;
@@ -26,6 +29,7 @@ struct Call {
 
   void finish(int value) {
     const std::lock_guard lock(mutex);
+    --*calls_inside;
     result = value;
     done = true;
     changed.notify_all();
@@ -62,6 +66,11 @@ void LIBUSB_CALL on_control(libusb_transfer* transfer) {
   libusb_free_transfer(transfer);
 }
 
+void close_device(libusb_device_handle* handle, int claimed) {
+  if (claimed >= 0) libusb_release_interface(handle, claimed);
+  libusb_close(handle);
+}
+
 }  // namespace
 
 UsbBus::UsbBus() {
@@ -72,6 +81,7 @@ UsbBus::UsbBus() {
       timeval wait{0, static_cast<suseconds_t>(std::chrono::microseconds(kEventWait).count())};
       if (libusb_handle_events_timeout_completed(context_, &wait, nullptr) != 0)
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      close_left();
     }
   });
 }
@@ -80,7 +90,22 @@ UsbBus::~UsbBus() {
   stop_ = true;
   libusb_interrupt_event_handler(context_);
   events_.join();
-  if (!abandoned_) libusb_exit(context_);
+  close_left();
+  if (!abandoned_ && left_.empty()) libusb_exit(context_);
+}
+
+void UsbBus::leave(Left left) {
+  const std::lock_guard lock(left_mutex_);
+  left_.push_back(std::move(left));
+}
+
+void UsbBus::close_left() {
+  const std::lock_guard lock(left_mutex_);
+  std::erase_if(left_, [](const Left& left) {
+    if (*left.calls_inside > 0) return false;
+    close_device(left.handle, left.claimed);
+    return true;
+  });
 }
 
 std::shared_ptr<UsbHandle> UsbHandle::open(std::shared_ptr<UsbBus> bus, libusb_device* device, int& error) {
@@ -91,12 +116,10 @@ std::shared_ptr<UsbHandle> UsbHandle::open(std::shared_ptr<UsbBus> bus, libusb_d
 }
 
 UsbHandle::~UsbHandle() {
-  if (stuck_) {
-    bus_->abandon();
-    return;
-  }
-  if (claimed_ >= 0) libusb_release_interface(handle_, claimed_);
-  libusb_close(handle_);
+  if (*calls_inside_ > 0)
+    bus_->leave({handle_, claimed_, calls_inside_});
+  else
+    close_device(handle_, claimed_);
 }
 
 int UsbHandle::claim(int interface) {
@@ -107,7 +130,7 @@ int UsbHandle::claim(int interface) {
 
 int UsbHandle::control(std::uint8_t type, std::uint8_t request, std::uint16_t value, std::uint16_t index,
                        std::span<std::uint8_t> data, std::chrono::milliseconds timeout) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<Call>(calls_inside_);
   call->buffer.resize(LIBUSB_CONTROL_SETUP_SIZE + data.size());
   libusb_fill_control_setup(call->buffer.data(), type, request, value, index,
                             static_cast<std::uint16_t>(data.size()));
@@ -118,16 +141,16 @@ int UsbHandle::control(std::uint8_t type, std::uint8_t request, std::uint16_t va
   auto owned = std::make_unique<std::shared_ptr<Call>>(call);
   libusb_fill_control_transfer(transfer, handle_, call->buffer.data(), on_control, owned.get(),
                                static_cast<unsigned>(timeout.count()));
+  ++*calls_inside_;
   const int error = libusb_submit_transfer(transfer);
   if (error != 0) {
+    --*calls_inside_;
     libusb_free_transfer(transfer);
     return error;
   }
-  static_cast<void>(owned.release());   // the callback's now
-  if (!call->wait(timeout + kGrace)) {  // libusb has cancelled it at `timeout`; it does not come back
-    stuck_ = true;
-    return LIBUSB_ERROR_TIMEOUT;
-  }
+  static_cast<void>(owned.release());  // the callback's now
+  // libusb has cancelled it at `timeout`; it does not come back, or later.
+  if (!call->wait(timeout + kGrace)) return LIBUSB_ERROR_TIMEOUT;
   if (call->result > 0 && (type & LIBUSB_ENDPOINT_IN) != 0)
     std::memcpy(data.data(), call->buffer.data() + LIBUSB_CONTROL_SETUP_SIZE,
                 static_cast<std::size_t>(call->result));
@@ -135,15 +158,12 @@ int UsbHandle::control(std::uint8_t type, std::uint8_t request, std::uint16_t va
 }
 
 bool UsbHandle::clear_halt(std::uint8_t endpoint) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<Call>(calls_inside_);
+  ++*calls_inside_;
   std::thread([call, handle = handle_, endpoint] {
     call->finish(libusb_clear_halt(handle, endpoint));
   }).detach();
-  if (!call->wait(kClearHaltWait)) {
-    stuck_ = true;
-    return false;
-  }
-  return call->result == 0;
+  return call->wait(kClearHaltWait) && call->result == 0;
 }
 
 std::string usb_error(int error) { return libusb_strerror(error); }

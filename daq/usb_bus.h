@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -30,14 +31,27 @@ class UsbBus {
   /// Something of ours is still pending in the context and will never be given back: it must outlive us.
   void abandon() { abandoned_ = true; }
 
+  /// An open device that calls of ours are still inside of.
+  struct Left {
+    libusb_device_handle* handle;
+    int claimed;
+    std::shared_ptr<const std::atomic<int>> calls_inside;
+  };
+  /// Takes it over: it is closed when they are back, or nobody else could open the device any more.
+  void leave(Left left);
+
  private:
+  void close_left();
+
   libusb_context* context_ = nullptr;
   std::atomic<bool> stop_{false}, abandoned_{false};
+  std::mutex left_mutex_;
+  std::vector<Left> left_;
   std::thread events_;
 };
 
-/// An open device. Ends with everything given back, or, where the bus gives nothing back, with it left behind
-/// on purpose: a transfer that is pending is never freed.
+/// An open device. Ends with everything given back, or, where the bus gives nothing back, with it left to the
+/// bus on purpose: a transfer that is pending is never freed.
 class UsbHandle {
  public:
   /// libusb's error where it cannot be opened.
@@ -68,7 +82,7 @@ class UsbHandle {
   std::shared_ptr<UsbBus> bus_;
   libusb_device_handle* handle_;
   int claimed_ = -1;
-  std::atomic<bool> stuck_{false};  // a call of another thread is still inside the system
+  std::shared_ptr<std::atomic<int>> calls_inside_ = std::make_shared<std::atomic<int>>(0);  // the system
 };
 
 /// "LIBUSB_ERROR_ACCESS" and the like, for people.

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -28,6 +29,8 @@ class UsbSource : public PacketSource {
     for (int attempt = 0; attempt < kOpenTries && !open(why); ++attempt) {
     }
     if (!stream_) throw InputError::in(name_, "{}", why);
+    settings_.serial = board_->serial();  // from now on no other board fits
+    board_in_use_ = {settings_.serial, settings_.oversampling};
   }
 
   ~UsbSource() override {
@@ -38,6 +41,12 @@ class UsbSource : public PacketSource {
   UsbSource& operator=(const UsbSource&) = delete;
 
   std::string name() const override { return name_; }
+  std::optional<BoardInUse> board() const override { return board_in_use_; }
+
+  std::string problem() const override {
+    const std::lock_guard lock(problem_mutex_);
+    return problem_;
+  }
 
   std::optional<std::uint64_t> ring_frames() const override {
     const std::int64_t frames = ring_frames_;
@@ -45,12 +54,19 @@ class UsbSource : public PacketSource {
     return static_cast<std::uint64_t>(frames);
   }
 
-  /// What the board sampled while nobody recorded is no part of the run.
+  /// What the board sampled while nobody recorded is no part of the run. Where it cannot be stopped just now
+  /// (its cable was pulled in the pause), the run's first bytes are those of a board that was opened anew.
   void begin_run() override {
     rest_.clear();
-    if (!stream_ || !board_->stop()) return;
-    stream_->discard(kQuiet);
-    board_->start(settings_.pattern);
+    break_cause_ = nullptr;
+    run_begins_ = true;
+    if (!stream_ || broken_ || !start_anew()) close();
+  }
+
+  std::optional<RunBoundary> boundary() const override { return boundary_; }
+
+  void idle() override {
+    if (stream_) stream_->discard(std::chrono::milliseconds(0));
   }
 
   ReadResult read(std::span<std::byte> buffer, std::chrono::milliseconds timeout) override {
@@ -75,7 +91,10 @@ class UsbSource : public PacketSource {
   bool reopen() override {
     if (stream_ && !broken_) return true;
     std::string why;
-    return open(why);
+    const bool is_back = open(why);
+    const std::lock_guard lock(problem_mutex_);
+    problem_ = is_back ? "" : why;
+    return is_back;
   }
 
  private:
@@ -116,28 +135,27 @@ class UsbSource : public PacketSource {
     board_.reset();
   }
 
-  /// A board that is sampling already, since only its cable or its host had gone, goes on without a break.
+  /// Drops what the board and the stream hold. Whatever of it is still on its way is known by its number.
+  bool start_anew() {
+    if (!board_->stop()) return false;
+    stream_->discard(kQuiet);
+    const auto statistics = board_->statistics();
+    if (!statistics || !board_->start(settings_.pattern)) return false;
+    if (run_begins_) boundary_ = {board_->identity().boot_id, statistics->frames};
+    run_begins_ = false;
+    return true;
+  }
+
+  /// Within a run a board that is sampling already, since only its cable or its host had gone, goes on
+  /// without a break.
   bool open(std::string& why) {
     close();
     board_ = UsbBoard::open(bus_, settings_.serial, why);
     if (!board_) return false;
-    const bool known =
-        board_->identity().boot_id == boot_id_ && (board_->identity().flags & TRW_FLAG_RUNNING) != 0;
-    if (!known && !configure(why)) {
+    if (!set_going(why)) {
       close();
       return false;
     }
-    const auto rate = board_->rate();
-    stream_ = std::make_unique<UsbStream>(board_->handle(), settings_.stream);
-    if (!rate || rate->tick_hz == 0 || (!known && !board_->start(settings_.pattern))) {
-      why = "the board does not start";
-      close();
-      return false;
-    }
-    // A slow board is not a silent one: three of its packets.
-    const double frame_s = static_cast<double>(rate->ticks_per_frame) / rate->tick_hz;
-    silence_limit_ =
-        std::max(settings_.silence, std::chrono::milliseconds(std::llround(3e3 * std::max(frame_s, 0.012))));
     boot_id_ = board_->identity().boot_id;
     silent_ = std::chrono::milliseconds(0);
     next_statistics_s_ = steady_seconds() + kStatistics_s;
@@ -145,39 +163,78 @@ class UsbSource : public PacketSource {
     return true;
   }
 
-  bool configure(std::string& why) {
-    if (settings_.rate_numerator_hz == 0 && settings_.oversampling == 0) return true;
-    const auto now = board_->rate();
-    if (!now || !board_->stop()) {
-      why = "the board does not answer";
+  bool set_going(std::string& why) {
+    auto rate = board_->rate();
+    const bool goes_on = !run_begins_ && board_->identity().boot_id == boot_id_ &&
+                         (board_->identity().flags & TRW_FLAG_RUNNING) != 0 && rate && is_as_asked(*rate);
+    if (!goes_on && rate && !is_as_asked(*rate)) {
+      if (!configure(*rate, why)) return false;
+      rate = board_->rate();
+    }
+    stream_ = std::make_unique<UsbStream>(board_->handle(), settings_.stream);
+    if (!rate || rate->tick_hz == 0 || (!goes_on && !start_anew())) {
+      why = "the board does not start";
       return false;
     }
-    trw_rate_wish wish{now->tick_hz, now->ticks_per_frame, now->oversampling};
+    demand(*rate);
+    // A slow board is not a silent one: three of its packets.
+    const double frame_s = static_cast<double>(rate->ticks_per_frame) / rate->tick_hz;
+    silence_limit_ =
+        std::max(settings_.silence, std::chrono::milliseconds(std::llround(3e3 * std::max(frame_s, 0.012))));
+    return true;
+  }
+
+  bool is_as_asked(const trw_rate& rate) const {
+    const bool rate_is = settings_.rate_numerator_hz == 0 ||
+                         std::uint64_t{rate.ticks_per_frame} * settings_.rate_numerator_hz ==
+                             std::uint64_t{rate.tick_hz} * settings_.rate_denominator;
+    return rate_is && (settings_.oversampling == 0 || settings_.oversampling == rate.oversampling);
+  }
+
+  /// A board that was without power is as it was made: from now on it is set as it was when it was opened
+  /// first, or the run would go on with another filter.
+  void demand(const trw_rate& rate) {
+    settings_.rate_numerator_hz = rate.tick_hz;
+    settings_.rate_denominator = rate.ticks_per_frame;
+    settings_.oversampling = rate.oversampling;
+  }
+
+  bool configure(const trw_rate& now, std::string& why) {
+    trw_rate_wish wish{now.tick_hz, now.ticks_per_frame, now.oversampling};
     if (settings_.rate_numerator_hz != 0) {
       wish.numerator_hz = settings_.rate_numerator_hz;
       wish.denominator = settings_.rate_denominator;
     }
     if (settings_.oversampling != 0) wish.oversampling = settings_.oversampling;
+    if (!board_->stop()) {
+      why = "the board does not answer";
+      return false;
+    }
     if (board_->set_rate(wish)) return true;
     why = fmt::format(
         "the board refuses {}/{} Hz with {} conversions per frame; its clock of {} Hz must make the rate "
         "exactly, and its converter keep up",
-        wish.numerator_hz, wish.denominator, wish.oversampling, now->tick_hz);
+        wish.numerator_hz, wish.denominator, wish.oversampling, now.tick_hz);
     return false;
   }
 
   std::string name_;
   UsbSourceSettings settings_;
+  BoardInUse board_in_use_;
   std::shared_ptr<UsbBus> bus_;
   std::unique_ptr<UsbBoard> board_;
   std::unique_ptr<UsbStream> stream_;
   std::deque<UsbStream::Unread> rest_;  // of a stream that broke
   const char* break_cause_ = nullptr;   // of a break that is not told yet
   std::uint32_t boot_id_ = 0;
+  bool run_begins_ = true;  // and has got no byte yet: no board goes on
+  std::optional<RunBoundary> boundary_;
   std::chrono::milliseconds silent_{0}, silence_limit_{0};
   double next_statistics_s_ = 0;
   std::atomic<std::int64_t> ring_frames_{-1};  // none yet
   bool broken_ = false;
+  mutable std::mutex problem_mutex_;
+  std::string problem_;
 };
 
 std::optional<std::uint32_t> whole(std::string_view text) {

@@ -14,8 +14,8 @@ namespace tunnelrig {
 struct UsbSourceSettings {
   std::string serial;              // or its beginning; empty: the only board there is
   bool pattern = false;            // counter instead of measurements
-  std::uint32_t oversampling = 0;  // 0: as the board is set
-  std::uint32_t rate_numerator_hz = 0, rate_denominator = 1;  // 0: as the board is set
+  std::uint32_t oversampling = 0;  // conversions per frame; 0: as the board is set when it is opened first
+  std::uint32_t rate_numerator_hz = 0, rate_denominator = 1;  // 0: likewise
   std::chrono::milliseconds silence{250};  // without a byte for so long, the stream counts as broken
   UsbStreamSettings stream;
 };

@@ -104,6 +104,18 @@ bool has_no_journal(const std::filesystem::path& path) {
   return !std::filesystem::exists(journal, error) || std::filesystem::file_size(journal, error) == 0;
 }
 
+/// Folds what stands only in the journal into the file, which is whole then without it. While others look on,
+/// the journal stays beside the file whoever else closes it.
+void fold_in_journal(const std::filesystem::path& path) {
+  if (has_no_journal(path)) return;
+  const Database database(path.string(), SQLITE_OPEN_READWRITE);
+  if (database.scalar_integer("PRAGMA wal_checkpoint(TRUNCATE)") != 0)
+    throw InputError::in(
+        path.string(),
+        "is being read by another program, which keeps its newest rows from being safe while it "
+        "is replaced; end that program and import again");
+}
+
 /// Whoever reads a journal shares an index of it with the others, which SQLite makes beside the file.
 void check_journal_can_be_read(const std::filesystem::path& path) {
   std::error_code error;
@@ -280,50 +292,6 @@ std::vector<PropellerTest> CampaignFile::propeller_tests() const {
   return found ? parse_propellers(*found, info().rig.rotors) : std::vector<PropellerTest>();
 }
 
-std::int64_t CampaignFile::add_document(std::string_view kind, const Provenance& provenance,
-                                        std::string_view json) {
-  Statement(*database_,
-            "INSERT INTO documents (kind, created_utc, program_version, arguments, inputs, document) "
-            "VALUES (?, ?, ?, ?, ?, ?)")
-      .bind(kind)
-      .bind(format_utc(utc_seconds()))
-      .bind(provenance.program_version)
-      .bind(provenance.arguments)
-      .bind(provenance.inputs)
-      .bind(json)
-      .run();
-  return database_->last_id();
-}
-
-std::vector<Document> CampaignFile::documents(std::string_view kind) const {
-  Statement select(*database_,
-                   "SELECT id, created_utc, program_version, arguments, inputs, document "
-                   "FROM documents WHERE kind = ? ORDER BY id");
-  select.bind(kind);
-  std::vector<Document> found;
-  while (select.step()) {
-    found.push_back({.id = select.integer(0),
-                     .kind = std::string(kind),
-                     .created_utc = select.text(1),
-                     .provenance = {select.text(2), select.text(3), select.text(4)},
-                     .json = select.text(5)});
-  }
-  return found;
-}
-
-std::optional<Document> CampaignFile::newest_document(std::string_view kind) const {
-  Statement select(*database_,
-                   "SELECT id, created_utc, program_version, arguments, inputs, document "
-                   "FROM documents WHERE kind = ? ORDER BY id DESC LIMIT 1");
-  select.bind(kind);
-  if (!select.step()) return {};
-  return Document{.id = select.integer(0),
-                  .kind = std::string(kind),
-                  .created_utc = select.text(1),
-                  .provenance = {select.text(2), select.text(3), select.text(4)},
-                  .json = select.text(5)};
-}
-
 std::string CampaignFile::integrity_problems() const {
   std::string problems;
   try {
@@ -379,6 +347,9 @@ void StagedCampaign::publish() {
                                    std::generic_category().message(failed)),
                        failed == ENOSPC || failed == EDQUOT);
   }
+  // The journal goes first, since it would be applied to whatever file it stands beside: what is there must
+  // be whole without it, for the case that we end here.
+  fold_in_journal(target_);
   std::error_code error;
   for (const std::string_view suffix : {"-wal", "-shm"})
     std::filesystem::remove(with_suffix(target_, suffix), error);

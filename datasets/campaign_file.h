@@ -131,7 +131,9 @@ class StagedCampaign {
 
   CampaignFile& file() { return *file_; }
 
-  /// Throws StorageError, and leaves the target as it was, where the new file may not be on the disk.
+  /// Throws StorageError, and leaves the target as it was, where the new file may not be on the disk;
+  /// InputError likewise, where another program's reading keeps the target from being whole until the last
+  /// moment.
   void publish();
 
  private:

@@ -26,8 +26,8 @@ void write_ledger(const Database& database, std::int64_t raw_run, const Ledger& 
       "frames_duplicate, "
       "frames_late, packets_corrupt, bytes_skipped, frames_overrun, frames_adc_error, reboots, silences, "
       "boot_id, first_sequence, board_rate_hz, rate_interval_hz, drift_ppm_h, drift_interval_ppm_h, "
-      "end_reason, source, frames_clipped, frames_test_pattern) "
-      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
+      "end_reason, source, frames_clipped, frames_test_pattern, board_serial, conversions_per_frame) "
+      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
       .bind(raw_run)
       .bind(as_sql(ledger.frames_emitted))
       .bind(as_sql(ledger.frames_stored))
@@ -50,6 +50,8 @@ void write_ledger(const Database& database, std::int64_t raw_run, const Ledger& 
       .bind(ledger.source)
       .bind(as_sql(ledger.frames_clipped))
       .bind(as_sql(ledger.frames_test_pattern))
+      .bind(ledger.board_serial)
+      .bind(std::int64_t{ledger.conversions_per_frame})
       .run();
 }
 
@@ -204,18 +206,20 @@ std::vector<Gap> gaps_of(const CampaignFile& file, std::int64_t raw_run) {
 }
 
 std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run) {
-  // A file of version 1 that is only read has no counts of these flags.
-  const bool flags = file.database().scalar_integer("PRAGMA user_version") >= 2;
+  // A file of an older version that is only read has not got all columns.
+  const std::int64_t version = file.database().scalar_integer("PRAGMA user_version");
   Statement select(
       file.database(),
       fmt::format(
           "SELECT frames_emitted, frames_stored, frames_lost, frames_duplicate, frames_late, "
           "packets_corrupt, "
           "bytes_skipped, frames_overrun, frames_adc_error, reboots, silences, boot_id, first_sequence, "
-          "board_rate_hz, rate_interval_hz, drift_ppm_h, drift_interval_ppm_h, end_reason, source, {} FROM "
+          "board_rate_hz, rate_interval_hz, drift_ppm_h, drift_interval_ppm_h, end_reason, source, {}, {} "
+          "FROM "
           "ledgers "
           "WHERE raw_run = ?",
-          flags ? "frames_clipped, frames_test_pattern" : "0, 0"));
+          version >= 2 ? "frames_clipped, frames_test_pattern" : "0, 0",
+          version >= 3 ? "board_serial, conversions_per_frame" : "'', 0"));
   select.bind(raw_run);
   if (!select.step()) return {};
   return Ledger{.frames_emitted = from_sql(select.integer(0)),
@@ -238,7 +242,9 @@ std::optional<Ledger> ledger_of(const CampaignFile& file, std::int64_t raw_run) 
                 .drift_ppm_h = select.maybe_real(15),
                 .drift_interval_ppm_h = select.maybe_real(16),
                 .end_reason = select.text(17),
-                .source = select.text(18)};
+                .source = select.text(18),
+                .board_serial = select.text(21),
+                .conversions_per_frame = static_cast<std::uint32_t>(select.integer(22))};
 }
 
 void read_raw(const CampaignFile& file, const RawRun& run, FrameSink& sink) {

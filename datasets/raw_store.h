@@ -37,6 +37,8 @@ struct Ledger {
   std::optional<double> rate_interval_hz, drift_ppm_h, drift_interval_ppm_h;  // where the rate was fitted
   std::string end_reason;
   std::string source;
+  std::string board_serial;                 // empty: the source does not know
+  std::uint32_t conversions_per_frame = 0;  // 0: likewise
 
   bool closed() const { return frames_emitted == frames_stored + frames_lost; }
 };

@@ -61,8 +61,8 @@ void add_note(CampaignFile& file, std::string_view run, std::string_view text) {
   file.atomically([&] { set(file, run, "note", with_note(cell_of(file, run, "note"), line)); });
 }
 
-void mark_alarms(CampaignFile& file, std::string_view run, std::string_view alarms) {
-  file.atomically([&] {
+bool mark_alarms(CampaignFile& file, std::string_view run, std::string_view alarms) {
+  return file.atomically_if_free([&] {
     if (cell_of(file, run, "alarms") != alarms) set(file, run, "alarms", alarms);
   });
 }

@@ -19,8 +19,9 @@ void include_run(CampaignFile& file, std::string_view run);
 /// Adds a line to a run's notes. Throws InputError for an unknown run or an empty text.
 void add_note(CampaignFile& file, std::string_view run, std::string_view text);
 
-/// Marks a run with the alarms that it had, "clipping;loss"; empty: none.
-void mark_alarms(CampaignFile& file, std::string_view run, std::string_view alarms);
+/// Marks a run with the alarms that it had, "clipping;loss"; empty: none. False at once, and nothing done,
+/// where another connection is writing to the file.
+bool mark_alarms(CampaignFile& file, std::string_view run, std::string_view alarms);
 
 /// A text that fits a cell and a line: control characters become blanks, at most 500 bytes (whole
 /// characters), trimmed.

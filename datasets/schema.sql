@@ -134,3 +134,9 @@ CREATE INDEX documents_by_kind ON documents (kind, id);
 -- Frames that the board flags: a channel at the end of the converter's range; a test pattern, no measurement.
 ALTER TABLE ledgers ADD COLUMN frames_clipped INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE ledgers ADD COLUMN frames_test_pattern INTEGER NOT NULL DEFAULT 0;
+
+-- @version 3
+
+-- The board that was recorded, where its source knows: its serial number, and of how many conversions it made a frame.
+ALTER TABLE ledgers ADD COLUMN board_serial TEXT NOT NULL DEFAULT '';
+ALTER TABLE ledgers ADD COLUMN conversions_per_frame INTEGER NOT NULL DEFAULT 0;

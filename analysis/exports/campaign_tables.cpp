@@ -203,6 +203,10 @@ Table recordings_table(const CampaignFile& file, const std::vector<RawRun>& raw,
               ledger_number(&Ledger::first_sequence))
       .column("end_reason", "", "Why the recording ended", ledger_text(&Ledger::end_reason))
       .column("source", "", "Where the bytes came from", ledger_text(&Ledger::source))
+      .column("board_serial", "", "Serial number of the board, where its source knows",
+              ledger_text(&Ledger::board_serial))
+      .column("conversions_per_frame", "1", "Of each channel, by the board; 0: its source does not know",
+              ledger_number(&Ledger::conversions_per_frame))
       .column("hash", "", "Of the raw data", [](const Recorded& one) { return one.raw.hash; })
       .take();
 }

@@ -78,6 +78,7 @@ void LiveFeed::progress(const LogProgress& progress) {
   shared_.progress = {.elapsed_s = progress.elapsed_s,
                       .silent = progress.silent,
                       .instead = progress.instead,
+                      .problem = progress.problem,
                       .ledger = *progress.ledger,
                       .clock = progress.clock,
                       .ring_frames = progress.ring_frames};

@@ -72,7 +72,7 @@ class LiveFeed {
   struct Progress {
     double elapsed_s = 0;
     bool silent = false;
-    std::string instead;  // as in LogProgress
+    std::string instead, problem;  // as in LogProgress
     Ledger ledger;
     std::optional<ClockEstimate> clock;
     std::optional<std::uint64_t> ring_frames;

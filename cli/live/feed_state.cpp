@@ -107,8 +107,9 @@ void LiveFeed::check(const Shared& now, const Scale& scale, Time time) {
                 time);
   }
   alarms_.set("silent", 0, recording && now.progress.silent,
-              now.progress.instead.empty() ? "no frames come from the board"
-                                           : fmt::format("no new frames, only {}", now.progress.instead),
+              !now.progress.problem.empty()  ? fmt::format("no frames come: {}", now.progress.problem)
+              : now.progress.instead.empty() ? "no frames come from the board"
+                                             : fmt::format("no new frames, only {}", now.progress.instead),
               time);
   alarms_.set("loss", 0, recording && ledger.frames_lost > 0,
               fmt::format("{} of {} frames lost in this run", ledger.frames_lost, ledger.frames_emitted),

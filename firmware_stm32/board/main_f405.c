@@ -169,11 +169,11 @@ static void start_watchdog(void) {
  * -------------------------------------------------------------------------------------------------- */
 
 /* Fed while the main loop turns and, where it should be sampling, frames come: a converter that has died is a
- * reset, too. */
+ * reset, too, and so is one that only ever starts anew. */
 static void feed_watchdog(void) {
   static uint32_t frames_seen, seen_at_ms;
   uint32_t key = lock(NULL);
-  uint32_t frames = (uint32_t)instrument.sequence, now = milliseconds;
+  uint32_t frames = board_frames_made(&instrument), now = milliseconds;
   uint32_t patience = 500u + 2000u * (instrument.rate.ticks_per_frame / (TIMER_HZ / 1000u)) / 1000u;
   bool running = instrument.running;
   unlock(NULL, key);

@@ -6,9 +6,11 @@
 
 enum {
   kPolls = 10000,
-  kSampleTime = 4,  /* 84 cycles of 21 MHz, 4 us: a source of 1 kOhm and 10 nF settles to 12 bits */
+  kSampleTime = 4,  /* 84 cycles of 21 MHz, 4 us: enough for a pin with 33 nF behind 1 kOhm */
   kTriggerTim2 = 6, /* table 69: TIM2_TRGO */
-  kErrors = BIT(0) | BIT(2) | BIT(3), /* FIFO, direct mode, transfer error of stream 0 */
+  /* Direct mode and transfer error of stream 0. Not the FIFO's: in direct mode it tells of a memory bus that
+   * was busy, the stream stays on and no data are lost (10.3.18); what is lost is the converter's overrun. */
+  kErrors = BIT(2) | BIT(3),
   kComplete = BIT(5),
   kInterrupts = BIT(4) | BIT(2) | BIT(1), /* of DMA2_S0CR: completion, transfer and direct mode error */
   kOverrun = BIT(5),                      /* of ADC_SR */
@@ -29,6 +31,7 @@ void sampling_init(void) {
   WR(ADC_SMPR2, kSampleTime | (kSampleTime << 3) | (kSampleTime << 6) | (kSampleTime << 9));
   WR(ADC_SQR1, (SAMPLING_CHANNELS - 1u) << 20);
   WR(ADC_SQR3, /* channel 0 first, then */ (1u << 5) | (2u << 10) | (3u << 15));
+  WR(TIM2 + TIM_CR2, 2u << 4); /* the update is the trigger output */
 }
 
 static void forget_interrupt(uint32_t irq) { WR(NVIC_ICPR(irq / 32u), BIT(irq % 32u)); }
@@ -76,21 +79,20 @@ static void start_anew(void) {
 
 void sampling_start(uint32_t ticks_per_scan, uint32_t scans_per_frame) {
   conversions = scans_per_frame * SAMPLING_CHANNELS;
-  WR(TIM2 + TIM_CR1, 0);
-  start_anew();
-  sampling = true;
   WR(TIM2 + TIM_PSC, 0);
   WR(TIM2 + TIM_ARR, ticks_per_scan - 1u);
   WR(TIM2 + TIM_CNT, 0);
-  WR(TIM2 + TIM_EGR, BIT(0)); /* loads the prescaler, before the trigger output is the update */
-  WR(TIM2 + TIM_CR2, 2u << 4);
+  /* Loads the prescaler. It is a trigger whatever the trigger output is (18.4.2, MMS 000: UG; 010: the update
+   * that UG makes), so that the converter must not listen yet: it would scan at once, a frame too many. */
+  WR(TIM2 + TIM_EGR, BIT(0));
+  start_anew();
+  sampling = true;
   WR(TIM2 + TIM_CR1, BIT(0));
 }
 
 void sampling_stop(void) {
   sampling = false;
   WR(TIM2 + TIM_CR1, 0);
-  WR(TIM2 + TIM_CR2, 0); /* the UG of the next start is no trigger */
   (void)halt();
 }
 

@@ -128,6 +128,8 @@ void board_on_scans(rig_board* b, const uint16_t* scans) {
   }
 }
 
+uint32_t board_frames_made(const rig_board* b) { return ring_head(&b->ring) + b->overruns; }
+
 uint32_t board_frames_missed(const rig_board* b, uint64_t now_ticks) {
   /* The origin is the end of the first frame: before it nothing can have been missed. */
   if (now_ticks < b->origin_ticks) return 0;

@@ -88,6 +88,10 @@ void board_on_scans(rig_board* b, const uint16_t* scans);
 /* Frames of time between the last one and `now_ticks` of the device clock, which no sample was taken for. */
 uint32_t board_frames_missed(const rig_board* b, uint64_t now_ticks);
 
+/* Frames that the converter has made, kept or not, modulo 2^32. Numbers grow by those that were missed, too.
+ */
+uint32_t board_frames_made(const rig_board* b);
+
 /* Sampling interrupt: a converter or DMA error; `frames_missed` frames of time went by unsampled. The filter
  * begins anew, as at a start. */
 void board_on_adc_error(rig_board* b, uint32_t frames_missed);

@@ -58,8 +58,9 @@ class Board {
 /// `log --plan` of one run, on a terminal of its own.
 class Terminal {
  public:
-  Terminal(const std::filesystem::path& folder, const std::string& source) {
-    write_text(folder / "plan.csv", "session,location,repeat,duration_s\nS1,OT,1,0.2\n");
+  Terminal(const std::filesystem::path& folder, const std::string& source, const char* duration_s = "0.2") {
+    write_text(folder / "plan.csv",
+               std::string("session,location,repeat,duration_s\nS1,OT,1,") + duration_s + "\n");
     pid_ = ::forkpty(&fd_, nullptr, nullptr, nullptr);
     if (pid_ != 0) return;
     if (::chdir(folder.c_str()) == 0)
@@ -72,13 +73,18 @@ class Terminal {
       ::kill(pid_, SIGKILL);
       ::waitpid(pid_, nullptr, 0);
     }
-    ::close(fd_);
+    hang_up();
   }
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
 
   bool shows(const std::string& text) {
     return until([&] { return shown_.find(text) != std::string::npos; });
+  }
+  /// The window is closed.
+  void hang_up() {
+    if (fd_ >= 0) ::close(fd_);
+    fd_ = -1;
   }
   void type(const std::string& keys) {
     ASSERT_EQ(::write(fd_, keys.data(), keys.size()), static_cast<ssize_t>(keys.size()));
@@ -137,6 +143,21 @@ TEST(Operator, CtrlCAtTheQuestionEndsThereWithoutARun) {
   EXPECT_EQ(terminal.ended(), 0);
   const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
   EXPECT_THAT(raw_runs(file), testing::IsEmpty());
+}
+
+TEST(Operator, AClosedTerminalEndsTheRunAsCtrlCDoes) {
+  const test::TemporaryFolder folder;
+  const Board board;
+  Terminal terminal(folder.path(), board.name(), "60");
+  ASSERT_TRUE(terminal.shows("Enter when ready"));
+  terminal.type("\n");
+  ASSERT_TRUE(terminal.shows(" frames, "));
+  terminal.hang_up();
+  EXPECT_NE(terminal.ended(), -1);
+  const CampaignFile file(folder / "c.db", CampaignFile::Access::kRead);
+  const RawRun run = raw_run(file, "R0001").value();
+  EXPECT_EQ(run.state, RunState::kPartial);
+  EXPECT_EQ(ledger_of(file, run.id)->end_reason, "stopped by the user");
 }
 
 /// What the program says on a terminal; `setting` for its environment.

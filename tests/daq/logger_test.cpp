@@ -256,10 +256,14 @@ TEST(Logger, AnotherProgramThatHoldsTheFileCostsNothing) {
   const test::TemporaryFolder folder;
   CampaignFile file = test::new_campaign(folder / "c.db");
   const Database other((folder / "c.db").string(), SQLITE_OPEN_READWRITE);
-  std::optional<Transaction> writing;
-  bool held_up = false;
+  std::optional<Transaction> writing(other);
+  bool waiting = false, held_up = false;
   const auto hold_to_beyond_the_end = [&](const LogProgress& progress) {
-    if (held_up) return;
+    if (progress.waiting) {
+      waiting = true;
+      writing.reset();
+    }
+    if (held_up || progress.waiting) return;
     if (!writing) writing.emplace(other);
     held_up = progress.held_up && progress.elapsed_s > progress.duration_s - 0.01;
     if (held_up) writing.reset();
@@ -267,13 +271,25 @@ TEST(Logger, AnotherProgramThatHoldsTheFileCostsNothing) {
   VirtualBoard board = counting_board(1);
   const LogOutcome outcome = log_run(board, file, test::cells("R1"), {.duration_s = 1.5}, test::summarizer(),
                                      hold_to_beyond_the_end, test::never_stop());
-  EXPECT_TRUE(held_up);
+  EXPECT_TRUE(waiting && held_up);
   EXPECT_EQ(outcome.state, RunState::kComplete);
   EXPECT_EQ(outcome.ledger.frames_lost, 0u);
   test::FrameList list;
   read_raw(file, raw_run(file, "R1").value(), list);
   ASSERT_EQ(list.count(), 2000u);
   for (std::size_t i = 0; i < list.count(); ++i) ASSERT_EQ(list.samples[4 * i], test::sample_of(i, 0));
+}
+
+TEST(Logger, ARunThatWaitsToBeginCanBeStopped) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  const Database other((folder / "c.db").string(), SQLITE_OPEN_READWRITE);
+  const Transaction writing(other);
+  std::atomic<bool> stop{false};
+  VirtualBoard board = counting_board(1);
+  const auto stop_it = [&](const LogProgress& progress) { stop = progress.waiting; };
+  EXPECT_THROW(log_run(board, file, test::cells("R1"), {.duration_s = 1}, test::summarizer(), stop_it, stop),
+               InputError);
 }
 
 /// Counts in shared memory what the sink was given, so that the parent knows what the child had received when

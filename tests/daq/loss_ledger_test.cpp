@@ -156,6 +156,25 @@ TEST(LossLedger, ARestartBelowAllThatIsRememberedIsKnownToo) {
   EXPECT_EQ(t.list.gaps.at(0), (Gap{16, 16, "reboot", true}));
 }
 
+TEST(LossLedger, ARestartIntoNumbersFromBeforeTheRunIsKnownByTheTime) {
+  Tracking t;
+  t.take({.first = 50000}, 10.0);
+  t.take({.first = 0, .sampled = 1000}, 11.016);
+  t.take({.first = 16, .sampled = 1000}, 11.032);
+  EXPECT_EQ(t.tracker.ledger().reboots, 1u);
+  EXPECT_EQ(t.tracker.ledger().frames_duplicate, 0u);
+  EXPECT_EQ(t.list.gaps.at(0), (Gap{16, 1016, "reboot", true}));
+}
+
+TEST(LossLedger, FramesFromBeforeTheRunThatALinkSendsAgainAreNoRestart) {
+  Tracking t;
+  t.take({.first = 50000}, 10.0);
+  for (std::uint64_t first = 49040; first <= 50016; first += 16) t.take({.first = first}, 10.5);
+  EXPECT_EQ(t.tracker.ledger().reboots, 0u);
+  EXPECT_EQ(t.tracker.ledger().frames_lost, 0u);
+  EXPECT_EQ(t.list.count(), 32u);
+}
+
 TEST(LossLedger, OneContradictingPacketDoesNotMoveTheCount) {
   Tracking t;
   for (std::uint64_t i = 0; i < 4; ++i) t.take({.first = 16 * i});

@@ -7,10 +7,13 @@
 
 #include <array>
 #include <fstream>
+#include <functional>
 #include <thread>
 
 #include <gtest/gtest.h>
 #include <pty.h>
+#include <sched.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 namespace tunnelrig {
@@ -23,6 +26,30 @@ void send_frames(int fd, std::uint64_t from, std::uint64_t to, bool paced) {
     ASSERT_EQ(::write(fd, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
     if (paced) std::this_thread::sleep_for(std::chrono::milliseconds(12));
   }
+}
+
+/// In a process whose clock says that the computer has slept for 1000 s since its start.
+int in_a_computer_that_slept(const std::function<bool()>& is_well) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::unshare(CLONE_NEWTIME) != 0) ::_exit(77);
+    std::ofstream("/proc/self/timens_offsets") << "boottime 1000 0" << std::flush;
+    const pid_t inside = ::fork();  // children of the process are in the new name space, not it itself
+    if (inside == 0) ::_exit(is_well() ? 0 : 1);
+    int status = 0;
+    ::waitpid(inside, &status, 0);
+    ::_exit(WEXITSTATUS(status));
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WEXITSTATUS(status);
+}
+
+TEST(SourceClock, RunsOnWhileTheComputerSleeps) {
+  const double before_s = steady_seconds();
+  const int code = in_a_computer_that_slept([&] { return steady_seconds() >= before_s + 1000; });
+  if (code == 77) GTEST_SKIP() << "no right to a name space of its own";
+  EXPECT_EQ(code, 0);
 }
 
 TEST(Tcp, AHangUpIsAGapAndTheRunGoesOn) {

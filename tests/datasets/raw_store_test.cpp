@@ -149,23 +149,35 @@ TEST_F(RawStore, AnInterruptedRunThatIsDamagedBecomesPartialAndStaysDamaged) {
   EXPECT_THROW(read_raw(file, run, notes), StorageError);
 }
 
-TEST_F(RawStore, FlagsAreKeptAndAFileFromBeforeThemIsStillRead) {
+TEST_F(RawStore, FlagsAndBoardAreKeptAndAFileFromBeforeThemIsStillRead) {
   RawWriter writer(file, "R1", {}, 133);
   writer.frames(frames(0, 100));
   writer.finish(RunState::kComplete, Ledger{.frames_emitted = 100,
                                             .frames_stored = 100,
                                             .frames_clipped = 40,
                                             .frames_test_pattern = 50,
-                                            .source = "tcp:x"});
+                                            .source = "tcp:x",
+                                            .board_serial = "5A5B",
+                                            .conversions_per_frame = 8});
   const std::int64_t id = raw_run(file, "R1")->id;
   EXPECT_EQ(ledger_of(file, id)->frames_clipped, 40u);
   EXPECT_EQ(ledger_of(file, id)->frames_test_pattern, 50u);
+  EXPECT_EQ(ledger_of(file, id)->board_serial, "5A5B");
+  EXPECT_EQ(ledger_of(file, id)->conversions_per_frame, 8u);
+  file.database().execute(
+      "ALTER TABLE ledgers DROP COLUMN board_serial; ALTER TABLE ledgers DROP COLUMN conversions_per_frame;"
+      "PRAGMA user_version = 2");
+  EXPECT_EQ(ledger_of(file, id)->frames_clipped, 40u);
+  EXPECT_EQ(ledger_of(file, id)->board_serial, "");
   file.database().execute(
       "ALTER TABLE ledgers DROP COLUMN frames_clipped; ALTER TABLE ledgers DROP COLUMN frames_test_pattern;"
       "PRAGMA user_version = 1");
   EXPECT_EQ(ledger_of(file, id)->frames_stored, 100u);
   EXPECT_EQ(ledger_of(file, id)->frames_clipped, 0u);
   EXPECT_EQ(ledger_of(file, id)->source, "tcp:x");
+  CampaignFile(folder / "c.db", Access::kWrite);  // which migrates it
+  EXPECT_EQ(ledger_of(file, id)->source, "tcp:x");
+  EXPECT_EQ(ledger_of(file, id)->board_serial, "");
 }
 
 /// `doctor` reads a run that grows meanwhile.

@@ -37,7 +37,8 @@ TEST_F(RunMarks, AddColumnsBesideTheRecorder) {
   exclude_run(desk, "R2", " a \"draught\", twice\n");
   add_note(desk, "R1", "17");  // a number is a remark all the same, not a covariate
   add_note(desk, "R1", "door open");
-  mark_alarms(desk, "R1", "clipping;loss");
+  EXPECT_TRUE(mark_alarms(desk, "R1", "clipping;loss"));
+  file.atomically([&] { EXPECT_FALSE(mark_alarms(desk, "R1", "")) << "and does not wait"; });
   file.append_row("runs", {{"run", "R3"},
                            {"location", "OT"},
                            {"repeat", "2"},

@@ -6,6 +6,7 @@
 
 extern "C" {
 #include "otg_fs.h"
+#include "sampling.h"
 #include "stm32f405.h"
 }
 
@@ -85,6 +86,7 @@ SamplingHardware::SamplingHardware(RegisterModel& model, std::function<void()> i
     const bool was_on = (model_.values[DMA2_S0CR] & BIT(0)) != 0, on = (v & BIT(0)) != 0;
     if (!was_on && on && model_.values[DMA2_LISR] != 0) throw std::logic_error("10.3.17: flags of old");
     model_.values[DMA2_S0CR] = v;
+    if (!was_on && on) converted_ = 0;
     if (was_on && !on) model_.values[DMA2_LISR] |= BIT(5);  // AN4031: a stream that is disabled sets TCIF
     settle();
   };
@@ -95,12 +97,32 @@ SamplingHardware::SamplingHardware(RegisterModel& model, std::function<void()> i
       throw std::logic_error("10.3.17: the stream is switched off before its peripheral");
     model_.values[ADC_CR2] = v;
   };
+  // TIMx_CR2, MMS: 000, the UG bit is the trigger output; 010, the update event, which UG makes.
+  model.on_write[TIM2 + TIM_EGR] = [this](std::uint32_t v) {
+    const std::uint32_t output = (model_.values[TIM2 + TIM_CR2] >> 4) & 7u;
+    if ((v & BIT(0)) != 0 && (output == 0 || output == 2)) trigger();
+  };
   model.on_write[NVIC_ICPR(IRQ_DMA2_STREAM0 / 32)] = [this](std::uint32_t v) {
     if ((v & BIT(IRQ_DMA2_STREAM0 % 32)) != 0) pending_ = false;
   };
 }
 
+void SamplingHardware::scan_is_due() {
+  const bool runs = (model_.values[TIM2 + TIM_CR1] & BIT(0)) != 0;
+  if (runs && ((model_.values[TIM2 + TIM_CR2] >> 4) & 7u) == 2) trigger();
+}
+
+/// TIM2_TRGO: one scan, where the converter is on and listens to it.
+void SamplingHardware::trigger() {
+  const std::uint32_t converter = model_.values[ADC_CR2];
+  if ((converter & BIT(0)) == 0 || ((converter >> 28) & 3u) != 1 || ((converter >> 24) & 15u) != 6) return;
+  if ((model_.values[DMA2_S0CR] & BIT(0)) == 0) return;
+  converted_ += SAMPLING_CHANNELS;
+  if (converted_ >= model_.values[DMA2_S0NDTR]) fill_buffer();
+}
+
 void SamplingHardware::fill_buffer() {
+  converted_ = 0;
   model_.values[DMA2_S0CR] ^= BIT(19);
   model_.values[DMA2_LISR] |= BIT(5);
   settle();

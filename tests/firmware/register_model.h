@@ -40,12 +40,14 @@ class RegisterModel {
 /// A F405 whose oscillators start, and whose stream, converter and OTG core do as they are told.
 void behave_well(RegisterModel& model);
 
-/// Stream 0 of DMA2, the converter and their one interrupt, which comes before the write that asked for it
-/// has returned: it stands above whatever starts and stops the sampling.
+/// TIM2, the converter, stream 0 of DMA2 and their one interrupt, which comes before the write that asked for
+/// it has returned: it stands above whatever starts and stops the sampling.
 class SamplingHardware {
  public:
   SamplingHardware(RegisterModel& model, std::function<void()> interrupt);
 
+  /// The timer's time for one scan has passed: where it runs, an update.
+  void scan_is_due();
   /// The stream has filled a buffer and goes on with the other one.
   void fill_buffer();
   /// The converter had a result that nobody took.
@@ -54,10 +56,12 @@ class SamplingHardware {
  private:
   bool asserted() const;
   void settle();
+  void trigger();
 
   RegisterModel& model_;
   std::function<void()> interrupt_;
   bool pending_ = false, inside_ = false;
+  std::uint32_t converted_ = 0;  // since the stream was switched on, or filled a buffer
 };
 
 /// What a host puts into the OTG core's one receive FIFO, and what it finds in the transmit FIFOs.

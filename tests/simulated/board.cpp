@@ -59,6 +59,11 @@ void Board::power_cycle() {
   power_up();
 }
 
+void Board::replace(std::uint8_t serial) {
+  serial_ = serial;
+  power_cycle();
+}
+
 double Board::frame_rate_hz() const {
   return static_cast<double>(core.rate.tick_hz) / core.rate.ticks_per_frame;
 }

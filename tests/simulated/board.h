@@ -23,6 +23,9 @@ class Board {
   /// Power off and on: everything starts anew, under another boot id.
   void power_cycle();
 
+  /// Another board in its place, with its cells; off and on, as power_cycle.
+  void replace(std::uint8_t serial);
+
   /// The time of `frames` frames passes: where sampling runs, they are sampled.
   void advance(std::uint64_t frames);
 

@@ -1,5 +1,8 @@
 #include "simulated/usb_bus.h"
 
+#include "simulated/device_text.h"
+
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -8,14 +11,12 @@
 #include <cstring>
 #include <ctime>
 #include <stdexcept>
+#include <utility>
 
-#include <fcntl.h>
 #include <linux/usbdevice_fs.h>
 #include <pthread.h>
 #include <sys/ioctl.h>
-#include <sys/stat.h>
 #include <umockdev.h>
-#include <unistd.h>
 
 namespace tunnelrig::simulated {
 namespace {
@@ -27,11 +28,6 @@ constexpr int kFullSpeedPackets = 19;  // of 64 bytes in a frame of 1 ms
 UMockdevTestbed* testbed() {
   static UMockdevTestbed* bed = umockdev_testbed_new();
   return bed;
-}
-
-int next_number() {
-  static int number = 1;
-  return ++number;
 }
 
 double now_s() {
@@ -48,26 +44,13 @@ double seconds_of(clockid_t clock) {
   return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
 }
 
-std::string hex_descriptors(Board& board) {
-  std::string text;
-  for (const std::uint16_t value : {std::uint16_t{0x0100}, std::uint16_t{0x0200}}) {
-    std::array<std::uint8_t, 256> data{};
-    const int size = board.control(0x80, 6, value, 0, 255, data.data());
-    for (int i = 0; i < size; ++i) {
-      char byte[3];
-      std::snprintf(byte, sizeof byte, "%02x", data[static_cast<std::size_t>(i)]);
-      text += byte;
-    }
-  }
-  return text;
-}
-
 }  // namespace
 
 UsbBus::UsbBus(Board& board, Pace pace)
     : board_(board), pace_(pace), handler_(umockdev_ioctl_base_new()), number_(1) {
   testbed();
   g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(on_ioctl), this);
+  g_signal_connect(handler_, "client-vanished", G_CALLBACK(on_close), this);
   worker_ = std::thread([this] { work(); });
 }
 
@@ -83,56 +66,35 @@ UsbBus::~UsbBus() {
   worker_.join();
   if (plugged) unplug();
   g_object_unref(handler_);
-  if (gate_ >= 0) ::close(gate_);
-}
-
-/// A regular file is always ready to poll(), and libusb would spin; a FIFO is ready when we say so.
-void UsbBus::replace_node_by_gate() {
-  char* root = umockdev_testbed_get_root_dir(testbed());
-  const std::string path = root + node_;
-  g_free(root);
-  ::unlink(path.c_str());
-  umockdev_testbed_disable(testbed());
-  const bool made = ::mkfifo(path.c_str(), 0666) == 0;
-  const int gate = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-  umockdev_testbed_enable(testbed());
-  require(made && gate >= 0, nullptr);
-  ::fcntl(gate, F_SETPIPE_SZ, 4096);  // one page: quickly filled and drained
-  const std::lock_guard lock(mutex_);
-  if (gate_ >= 0) ::close(gate_);
-  gate_ = gate;
-  gate_full_ = false;
-  show_ready(false);
 }
 
 void UsbBus::plug() {
-  std::string descriptors;
+  std::string text;
   {
     const std::lock_guard lock(mutex_);
-    number_ = next_number();
+    static int newest = 1;
+    number_ = ++newest;
+    char node[32];
+    std::snprintf(node, sizeof node, "/dev/bus/usb/001/%03d", number_);
+    node_ = node;
     board_.enumerate();  // a kernel would have done it
-    descriptors = hex_descriptors(board_);
+    text = device_text(board_, number_, node_);
     mangled_.clear();
     mangled_used_ = 0;
     clock_s_ = now_s();
   }
-  char text[2048];
-  std::snprintf(text, sizeof text, "/dev/bus/usb/001/%03d", number_);
-  node_ = text;
-  std::snprintf(
-      text, sizeof text,
-      "P: /devices/usb1/1-1\nN: bus/usb/001/%03d\nE: DEVNAME=%s\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\n"
-      "E: BUSNUM=001\nE: DEVNUM=%03d\nE: MAJOR=189\nE: MINOR=%d\nE: PRODUCT=1209/1/100\nA: busnum=1\\n\n"
-      "A: devnum=%d\\n\nA: speed=12\\n\nA: bConfigurationValue=1\\n\nA: idVendor=1209\\n\nA: "
-      "idProduct=0001\\n\n"
-      "H: descriptors=%s\n",
-      number_, node_.c_str(), number_, number_ - 1, number_, descriptors.c_str());
   GError* error = nullptr;
-  require(umockdev_testbed_add_from_string(testbed(), text, &error) != 0, error);
+  require(umockdev_testbed_add_from_string(testbed(), text.c_str(), &error) != 0, error);
   require(umockdev_testbed_attach_ioctl(testbed(), node_.c_str(), handler_, &error) != 0, error);
-  replace_node_by_gate();
+  char* root = umockdev_testbed_get_root_dir(testbed());
+  const std::string path = root + node_;
+  g_free(root);
   {
     const std::lock_guard lock(mutex_);
+    umockdev_testbed_disable(testbed());
+    const bool made = gate_.make(path);
+    umockdev_testbed_enable(testbed());
+    require(made, nullptr);
     gone_ = false;
   }
   umockdev_testbed_uevent(testbed(), kSysPath, "add");
@@ -147,7 +109,9 @@ void UsbBus::unplug() {
       pending_.pop_front();
       complete(urb, -ESHUTDOWN);
     }
-    show_ready(true);
+    cancelled_.clear();
+    claimed_by_ = nullptr;
+    gate_.show(true);
     board_.controller.reset();
   }
   umockdev_testbed_uevent(testbed(), kSysPath, "remove");
@@ -158,6 +122,13 @@ void UsbBus::unplug() {
 void UsbBus::set_deaf(bool deaf) {
   const std::lock_guard lock(mutex_);
   deaf_ = deaf;
+  if (deaf) return;
+  for (usbdevfs_urb* urb : std::exchange(cancelled_, {})) cancel(urb);
+  std::erase_if(pending_, [this](usbdevfs_urb* urb) {
+    if (urb->type != USBDEVFS_URB_TYPE_CONTROL) return false;
+    answer(urb);
+    return true;
+  });
 }
 
 bool UsbBus::fail_transfer(int error, bool keep) {
@@ -189,23 +160,10 @@ double UsbBus::processor_s() {
 
 // --- everything below with the lock held, but for work() and on_ioctl()
 
-void UsbBus::show_ready(bool ready) {
-  if (gate_ < 0 || ready != gate_full_) return;  // a full FIFO is not writable: nothing to reap
-  std::array<char, 4096> bytes{};
-  if (ready) {
-    while (::read(gate_, bytes.data(), bytes.size()) > 0) {
-    }
-  } else {
-    while (::write(gate_, bytes.data(), bytes.size()) > 0) {
-    }
-  }
-  gate_full_ = !ready;
-}
-
 void UsbBus::complete(usbdevfs_urb* urb, int status) {
   urb->status = status;
   done_[number_].push_back(urb);
-  show_ready(true);
+  gate_.show(true);
 }
 
 /// Moves packets into `urb`; true where it is finished, with its status.
@@ -313,23 +271,31 @@ long UsbBus::submit(usbdevfs_urb* urb) {
   if (deaf_ || urb->type != USBDEVFS_URB_TYPE_CONTROL) {
     pending_.push_back(urb);
     wake_.notify_all();
-    return 0;
+  } else {
+    answer(urb);
   }
+  return 0;
+}
+
+void UsbBus::answer(usbdevfs_urb* urb) {
   auto* setup = static_cast<std::uint8_t*>(urb->buffer);
   const int size = board_.controller.control(setup, setup + 8);
   if (size >= 0) urb->actual_length = size;
   complete(urb, size == kStall ? -EPIPE : size < 0 ? -EPROTO : 0);
-  return 0;
 }
 
-long UsbBus::discard(void* urb, int& error) {
-  for (auto at = pending_.begin(); at != pending_.end() && !deaf_; ++at) {
-    if (*at != urb) continue;
-    pending_.erase(at);
-    complete(static_cast<usbdevfs_urb*>(urb), -ENOENT);
+bool UsbBus::cancel(usbdevfs_urb* urb) {
+  if (std::erase(pending_, urb) == 0) return false;
+  complete(urb, -ENOENT);
+  return true;
+}
+
+long UsbBus::discard(usbdevfs_urb* urb, int& error) {
+  if (deaf_) {
+    cancelled_.push_back(urb);  // accepted, and then nothing until the bus comes back
     return 0;
   }
-  if (deaf_) return 0;  // accepted, and then nothing
+  if (cancel(urb)) return 0;
   error = gone_ ? ENODEV : EINVAL;
   return -1;
 }
@@ -338,16 +304,32 @@ long UsbBus::reap(void** urb, int number, bool dead, int& error) {
   std::deque<usbdevfs_urb*>& done = done_[number];
   if (done.empty()) {
     error = dead ? ENODEV : EAGAIN;
-    if (!dead) show_ready(false);
+    if (!dead) gate_.show(false);
     return -1;
   }
   *urb = done.front();
   done.pop_front();
-  if (done.empty() && !dead) show_ready(false);
+  if (done.empty() && !dead) gate_.show(false);
   return 0;
 }
 
-long UsbBus::ioctl(unsigned long request, void* argument, int number, int& error) {
+/// As a kernel does: of one opened file, until that is closed.
+long UsbBus::claim(const void* file, int& error) {
+  if (claimed_by_ != nullptr && claimed_by_ != file) {
+    error = EBUSY;
+    return -1;
+  }
+  claimed_by_ = file;
+  return 0;
+}
+
+void UsbBus::on_close(_UMockdevIoctlBase* /*base*/, _UMockdevIoctlClient* file, void* context) {
+  auto& self = *static_cast<UsbBus*>(context);
+  const std::lock_guard lock(self.mutex_);
+  if (self.claimed_by_ == file) self.claimed_by_ = nullptr;
+}
+
+long UsbBus::ioctl(unsigned long request, void* argument, const void* file, int number, int& error) {
   const bool dead = gone_ || number != number_;
   if (request == static_cast<unsigned>(USBDEVFS_REAPURBNDELAY))
     return reap(static_cast<void**>(argument), number, dead, error);
@@ -356,7 +338,8 @@ long UsbBus::ioctl(unsigned long request, void* argument, int number, int& error
         USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
     return 0;
   }
-  if (request == static_cast<unsigned>(USBDEVFS_DISCARDURB)) return discard(argument, error);
+  if (request == static_cast<unsigned>(USBDEVFS_DISCARDURB))
+    return discard(static_cast<usbdevfs_urb*>(argument), error);
   if (dead) {
     error = ENODEV;
     return -1;
@@ -365,7 +348,9 @@ long UsbBus::ioctl(unsigned long request, void* argument, int number, int& error
     case static_cast<unsigned>(USBDEVFS_SUBMITURB):
       return submit(static_cast<usbdevfs_urb*>(argument));
     case static_cast<unsigned>(USBDEVFS_CLAIMINTERFACE):
+      return claim(file, error);
     case static_cast<unsigned>(USBDEVFS_RELEASEINTERFACE):
+      if (claimed_by_ == file) claimed_by_ = nullptr;
       return 0;
     case static_cast<unsigned>(USBDEVFS_CLEAR_HALT):
       board_.control(0x02, 1, 0, static_cast<std::uint16_t>(*static_cast<unsigned*>(argument)), 0, nullptr);
@@ -385,7 +370,7 @@ int UsbBus::on_ioctl(_UMockdevIoctlBase* /*base*/, _UMockdevIoctlClient* client,
   long result = 0;
   {
     const std::lock_guard lock(self.mutex_);
-    result = self.ioctl(request, argument, number, error);
+    result = self.ioctl(request, argument, client, number, error);
     self.ioctl_processor_s_ = seconds_of(CLOCK_THREAD_CPUTIME_ID);
   }
   umockdev_ioctl_client_complete(client, result, error);

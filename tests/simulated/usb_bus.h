@@ -3,6 +3,7 @@
 #pragma once
 
 #include "simulated/board.h"
+#include "simulated/gate.h"
 
 #include <atomic>
 #include <condition_variable>
@@ -42,7 +43,7 @@ class UsbBus {
   void plug();
   void unplug();
 
-  /// From now on nothing is completed and nothing cancelled: a hung host controller.
+  /// Nothing is completed and nothing cancelled meanwhile: a hung host controller.
   void set_deaf(bool deaf);
 
   /// The oldest pending transfer ends with `error` (a positive errno); what it held already is `keep` or
@@ -63,13 +64,15 @@ class UsbBus {
   int service(int budget);
   bool fill(usbdevfs_urb& urb, int& budget, int& status);
   void complete(usbdevfs_urb* urb, int status);
-  void show_ready(bool ready);
-  void replace_node_by_gate();
-  long ioctl(unsigned long request, void* argument, int number, int& error);
+  long ioctl(unsigned long request, void* argument, const void* file, int number, int& error);
+  long claim(const void* file, int& error);
   long reap(void** urb, int number, bool dead, int& error);
   long submit(usbdevfs_urb* urb);
-  long discard(void* urb, int& error);
+  void answer(usbdevfs_urb* urb);
+  bool cancel(usbdevfs_urb* urb);
+  long discard(usbdevfs_urb* urb, int& error);
   static int on_ioctl(_UMockdevIoctlBase*, _UMockdevIoctlClient* client, void* self);
+  static void on_close(_UMockdevIoctlBase*, _UMockdevIoctlClient* file, void* self);
 
   Board& board_;
   Pace pace_;
@@ -77,14 +80,15 @@ class UsbBus {
   std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<usbdevfs_urb*> pending_;
+  std::vector<usbdevfs_urb*> cancelled_;           // while it was deaf
   std::map<int, std::deque<usbdevfs_urb*>> done_;  // by device number: one that is gone is still reaped
   std::vector<std::uint8_t> mangled_;              // bytes on the wire that no transfer has taken yet
   std::size_t mangled_used_ = 0;
   bool mangled_end_ = false;  // a short packet stands at their end
   Mangle mangle_;
   bool gone_ = true, deaf_ = false, quit_ = false;
-  int gate_ = -1;
-  bool gate_full_ = false;
+  Gate gate_;
+  const void* claimed_by_ = nullptr;
   int number_;
   double clock_s_ = 0;
   double ioctl_processor_s_ = 0;

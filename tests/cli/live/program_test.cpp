@@ -272,6 +272,24 @@ TEST_F(LivePage, ServeFollowsWhoRecords) {
   EXPECT_THAT(second.error, HasSubstr("is being recorded to by process"));
 }
 
+TEST_F(LivePage, AnotherProgramThatHoldsTheFileDoesNotEndIt) {
+  prepare();
+  Served log(folder.path(), "log --db c.db --live 0 --session S1");
+  EventStream stream(log.port());
+  const json start = {{"command", "start"}, {"location", "OT"}, {"duration_s", 1}};
+  {
+    const Database other((folder / "c.db").string(), SQLITE_OPEN_READWRITE);
+    const Transaction writing(other);
+    EXPECT_THAT(log.command(start).body, HasSubstr("has not begun yet"));
+    EXPECT_EQ(log.command({{"command", "stop"}}).status, 200);
+    until_over(stream, "R0002");
+  }
+  EXPECT_EQ(log.command(start).status, 200);
+  until_over(stream, "R0002");
+  EXPECT_EQ(raw_run(file(), "R0002").value().state, RunState::kComplete);
+  EXPECT_EQ(log.stop(), 0);
+}
+
 TEST_F(LivePage, BadInputHasAWayOn) {
   prepare();
   Served serve(folder.path(), "serve --db c.db --port 0");

@@ -127,6 +127,58 @@ TEST(Usb, APulledCableIsAGapAndTheRunGoesOn) {
   expect_every_frame_in_its_place(logged);
 }
 
+TEST(Usb, ABoardThatWasWithoutPowerIsSetAsItWas) {
+  Rig rig(Pace::kRig);
+  open_source("usb:,rate=1000,oversampling=8").reset();
+  const auto source = open_source("usb");  // by a later program, as the board is set
+  std::atomic<bool> streaming{false};
+  std::thread operator_thread([&] {
+    EXPECT_TRUE(wait_for(10, [&] { return streaming.load(); }));
+    rig.bus.unplug();
+    rig.bus.with_board([](simulated::Board& board) { board.power_cycle(); });
+    rig.bus.plug();
+  });
+  const auto progress = [&](const LogProgress& now) { streaming = now.ledger->frames_stored > 0; };
+  const Logged logged = log_usb(*source, 2, progress);
+  operator_thread.join();
+  EXPECT_EQ(logged.outcome.state, RunState::kComplete) << logged.outcome.ledger.end_reason;
+  EXPECT_EQ(logged.outcome.ledger.reboots, 1u);
+  EXPECT_EQ(logged.outcome.ledger.conversions_per_frame, 8u);
+  rig.bus.with_board([](simulated::Board& board) {
+    EXPECT_EQ(board.core.rate.oversampling, 8u);
+    EXPECT_EQ(board.core.rate.ticks_per_frame, 84000u);
+  });
+}
+
+TEST(Usb, AnotherBoardInItsPlaceIsNotTheRuns) {
+  Rig rig(Pace::kRig);
+  const auto source = open_source("usb");  // whichever there is
+  std::atomic<bool> streaming{false}, refused{false};
+  const auto plug_in = [&](std::uint8_t serial) {
+    rig.bus.unplug();
+    rig.bus.with_board([&](simulated::Board& board) { board.replace(serial); });
+    rig.bus.plug();
+  };
+  std::thread operator_thread([&] {
+    EXPECT_TRUE(wait_for(10, [&] { return streaming.load(); }));
+    plug_in(0x77);
+    EXPECT_TRUE(wait_for(10, [&] { return refused.load(); }));
+    rig.bus.with_board([](simulated::Board& board) { EXPECT_FALSE(board.running()); });
+    plug_in(0x5A);
+  });
+  const auto progress = [&](const LogProgress& now) {
+    streaming = now.ledger->frames_stored > 0;
+    if (now.problem.find("no board of serial number 5A5B5C5D5E5F606162636465; there are 7778797A") == 0)
+      refused = true;
+  };
+  const Logged logged = log_usb(*source, 3, progress);
+  operator_thread.join();
+  EXPECT_EQ(logged.outcome.state, RunState::kComplete);
+  EXPECT_EQ(logged.outcome.ledger.board_serial, "5A5B5C5D5E5F606162636465");
+  EXPECT_EQ(logged.outcome.ledger.reboots, 1u);
+  EXPECT_EQ(source->problem(), "");
+}
+
 TEST(Usb, AnUnplugIsNoticedAndABoardWithItsOwnSupplyLosesNothing) {
   Rig rig(Pace::kRig);
   const auto source = open_source("usb");
