@@ -80,8 +80,8 @@ class PacketSource {
 /// the source and what is wrong with it. (The virtual rig needs more than a name: virtual_rig.h.)
 std::unique_ptr<PacketSource> open_source(const std::string& name);
 
-/// Seconds on the clock of a source that runs in real time. They pass while the computer sleeps, too: the board
-/// goes on meanwhile, or has been away for so long.
+/// Seconds on the clock of a source that runs in real time. They pass while the computer sleeps, too: the
+/// board goes on meanwhile, or has been away for so long.
 double steady_seconds();
 
 }  // namespace tunnelrig

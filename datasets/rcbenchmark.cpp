@@ -2,6 +2,7 @@
 
 #include "datasets/error.h"
 #include "datasets/lower_case.h"
+#include "datasets/table_dates.h"
 
 #include <algorithm>
 #include <map>

@@ -70,10 +70,6 @@ void warn_of_scatter(const Observations& observations, Explanation& explanation)
 /// Candidates that would be named, were it not for their physical bounds.
 void warn_of_bounds(const Observations& observations, const Attribution& found, Explanation& explanation);
 
-/// What all runs say against a name that the open ones had let in; empty: nothing. Theory's coefficient is
-/// not the data's to refute. (explain.cpp)
-std::string refutation(const AdoptedEffect& adopted, const Observations& observations);
-
 /// Of two errors of the sealed blocks: by more than chance may do.
 inline bool is_worse(double error, double than) { return error > 1.1 * than; }
 
@@ -95,6 +91,20 @@ void warn_of_tares(const Observations& observations, const MeanModel& model, Exp
 
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
+
+// --- taken_back.cpp
+
+/// What all runs say against a name that the open ones had let in; empty: nothing. Theory's coefficient is
+/// not the data's to refute.
+std::string refutation(const AdoptedEffect& adopted, const Observations& observations);
+
+/// Once more without the names that are refuted: what they did may be structure whose cause is not known.
+/// Where the names predict the sealed blocks, and what is found without them does not, they stay; so does the
+/// first of names that took each other's place and are all refuted like that. What may not be found any more
+/// is out of `effects` and `settings` then.
+Explanation without_refuted(Explanation explanation, const Observations& observations,
+                            std::vector<const Effect*>& effects, SearchSettings& settings,
+                            std::vector<std::string>& said);
 
 // --- incomplete_conditions.cpp
 
