@@ -150,7 +150,7 @@ std::string taken_back_all(const Explanation& explanation) {
 }
 
 /// What was found, and what of it all runs refute.
-struct Found {
+struct Attempt {
   Explanation explanation;
   Refuted refuted;
   std::vector<const Effect*> effects;
@@ -172,7 +172,7 @@ void say(const Refuted& refuted, bool stay, std::vector<std::string>& said) {
 Explanation without_refuted(Explanation explanation, const Observations& observations,
                             std::vector<const Effect*>& effects, SearchSettings& settings,
                             std::vector<std::string>& said) {
-  std::vector<Found> before;
+  std::vector<Attempt> before;
   Refuted found = refuted(explanation, observations);
   const bool chosen = explanation.seal_chose || found.any();
   for (; found.any(); found = refuted(explanation, observations)) {
@@ -189,7 +189,7 @@ Explanation without_refuted(Explanation explanation, const Observations& observa
                       is_worse(explanation.sealed.curves, explanation.sealed.all) &&
                       is_worse(without_them, explanation.sealed.all);
     if (stay) {
-      const auto as_well = std::ranges::find_if(before, [&](const Found& earlier) {
+      const auto as_well = std::ranges::find_if(before, [&](const Attempt& earlier) {
         return !earlier.refuted.all && !earlier.refuted.beyond &&
                !is_worse(earlier.explanation.sealed.all, explanation.sealed.all);
       });
