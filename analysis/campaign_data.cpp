@@ -9,6 +9,7 @@
 #include <cmath>
 #include <exception>
 #include <mutex>
+#include <set>
 #include <thread>
 
 namespace tunnelrig {
@@ -31,6 +32,22 @@ RunStatistics summarize(const CampaignFile& file, const CampaignInfo& info, cons
   return summarizer->finish(run.hash);
 }
 
+/// Adds their windows to the statistics of those runs.
+void read_windows_of(const CampaignFile& file, const std::set<std::string>& runs, CampaignData& data) {
+  std::map<std::int64_t, RunStatistics> with_windows;
+  for (const std::string& name : runs)
+    if (const auto raw = data.raw.find(name); raw != data.raw.end() && data.statistics.contains(name))
+      with_windows[raw->second.id];
+  read_windows(file, with_windows);
+  for (const std::string& name : runs) {
+    const auto raw = data.raw.find(name);
+    const auto found = raw == data.raw.end() ? with_windows.end() : with_windows.find(raw->second.id);
+    if (found == with_windows.end()) continue;
+    data.statistics[name].window_s = found->second.window_s;
+    data.statistics[name].window_means_V = std::move(found->second.window_means_V);
+  }
+}
+
 }  // namespace
 
 CampaignData read_campaign_data(const CampaignFile& file) {
@@ -44,6 +61,10 @@ CampaignData read_campaign_data(const CampaignFile& file) {
     }
     data.raw.emplace(raw.run, std::move(raw));
   }
+  std::set<std::string> tares;  // what they leave of slow noise is in every run's zero
+  for (const Run& run : data.runs)
+    if (run.kind == RunKind::kTare) tares.insert(run.run);
+  read_windows_of(file, tares, data);
   if (const auto document = file.newest_document("calibration")) {
     data.certificate = certificate_from_json(document->json);
     data.certificate_id = document->id;
@@ -52,15 +73,9 @@ CampaignData read_campaign_data(const CampaignFile& file) {
 }
 
 void read_run_windows(const CampaignFile& file, CampaignData& data) {
-  auto windows = all_statistics(file);
-  read_windows(file, windows);
-  for (const auto& [name, raw] : data.raw) {
-    const auto from = windows.find(raw.id);
-    const auto to = data.statistics.find(name);
-    if (from == windows.end() || to == data.statistics.end()) continue;
-    to->second.window_s = from->second.window_s;
-    to->second.window_means_V = std::move(from->second.window_means_V);
-  }
+  std::set<std::string> all;
+  for (const auto& [name, statistics] : data.statistics) all.insert(name);
+  read_windows_of(file, all, data);
 }
 
 std::map<std::string, RunStatistics> statistics_from_raw(

@@ -25,7 +25,7 @@ struct CampaignData {
   std::int64_t certificate_id = 0;
 };
 
-/// Reads everything but raw data and windows.
+/// Reads everything but raw data, and windows of the tares only.
 CampaignData read_campaign_data(const CampaignFile& file);
 
 /// Adds the windows within every run to the statistics.

@@ -38,7 +38,8 @@ double mean_own_variance(const VisitDesign& design, const VarianceComponents& co
 }
 
 /// The variance with which a session would seem to vary if it did not: the mean square of visits over their
-/// number in a session, where all have as many; else by traces of Zᵀ P₀ Z as that has it.
+/// number in a session, where all have as many; else by traces of Zᵀ P₀ Z, P₀ being the visits' weights less
+/// what their locations' means take, and Z the sessions of the visits.
 double seeming_session(const VisitDesign& design, const VarianceComponents& components) {
   const auto sessions = static_cast<Index>(design.sessions), locations = static_cast<Index>(design.locations);
   Eigen::MatrixXd w = Eigen::MatrixXd::Zero(sessions, locations);

@@ -64,6 +64,13 @@ void compare(const CampaignData& data, const std::vector<std::size_t>& runs, con
   }
 }
 
+constexpr double kRounded_percent = 0.005;  // of C_T: less is printed as nothing
+
+/// By how much of C_T, in per cent, a location must differ to be worth a word.
+double apart_percent(double u95_percent) {
+  return std::isfinite(u95_percent) ? u95_percent : kRounded_percent;
+}
+
 std::string sentence(const UnusedCondition& condition, double u95_percent) {
   if (condition.recorded == 0)
     return fmt::format("{}: {}, and not recorded; {}", condition.quantity, condition.taken_for,
@@ -74,7 +81,7 @@ std::string sentence(const UnusedCondition& condition, double u95_percent) {
                                      ? fmt::format(" in {} of {} runs", condition.recorded, condition.runs)
                                      : "",
                                  condition.mean_text, UnusedCondition::change(condition.c_t_percent));
-  if (std::abs(condition.furthest_c_t_percent - condition.c_t_percent) > u95_percent)
+  if (std::abs(condition.furthest_c_t_percent - condition.c_t_percent) > apart_percent(u95_percent))
     text += fmt::format(", that of {} {}", condition.furthest,
                         UnusedCondition::change(condition.furthest_c_t_percent));
   if (std::isfinite(u95_percent)) text += fmt::format(", where U95 is {:.2f} %", u95_percent);
@@ -83,10 +90,8 @@ std::string sentence(const UnusedCondition& condition, double u95_percent) {
 
 /// Of a speed that was kept there is nothing to say.
 bool says_something(const UnusedCondition& condition, double u95_percent) {
-  constexpr double kRounded = 0.005;
-  const double apart = std::isfinite(u95_percent) ? u95_percent : kRounded;
-  return condition.recorded < condition.runs || std::abs(condition.c_t_percent) >= kRounded ||
-         std::abs(condition.furthest_c_t_percent - condition.c_t_percent) > apart;
+  return condition.recorded < condition.runs || std::abs(condition.c_t_percent) >= kRounded_percent ||
+         std::abs(condition.furthest_c_t_percent - condition.c_t_percent) > apart_percent(u95_percent);
 }
 
 bool adopted(const AppliedModel& model, const std::string& effect) {

@@ -164,89 +164,6 @@ void maximise(const VisitDesign& design, bool free_visit, bool free_session, dou
   }
 }
 
-/// Zᵀ P₀ᵏ Z, P₀ being P below without sessions and Z the sessions of the visits. Of one location P₀ is
-/// W − w wᵀ/Σw, and it saw a session at most once: the powers are a diagonal and few products of columns.
-struct PowersOfSessions {
-  Eigen::MatrixXd once, twice, thrice;
-
-  PowersOfSessions(const VisitDesign& design, const Eigen::VectorXd& weight) {
-    const auto sessions = static_cast<Eigen::Index>(design.sessions),
-               locations = static_cast<Eigen::Index>(design.locations);
-    Eigen::MatrixXd w = Eigen::MatrixXd::Zero(sessions, locations);
-    for (Eigen::Index v = 0; v < weight.size(); ++v) {
-      const LocationVisit& visit = design.visits[static_cast<std::size_t>(v)];
-      w(static_cast<Eigen::Index>(visit.session), static_cast<Eigen::Index>(visit.location)) = weight(v);
-    }
-    const Eigen::MatrixXd w2 = w.array().square(), w3 = w.array().cube();
-    const auto never_visited = [](double sum) { return sum > 0 ? 1 / sum : 0; };
-    const Eigen::VectorXd share = w.colwise().sum().transpose().unaryExpr(never_visited);  // 1/Σw
-    const Eigen::VectorXd second =
-        w2.colwise().sum().transpose().cwiseProduct(share).cwiseProduct(share);  // Σw²/(Σw)²
-    const Eigen::VectorXd third = w3.colwise().sum().transpose().cwiseProduct(share).cwiseProduct(share) -
-                                  second.cwiseProduct(second).cwiseQuotient(share.cwiseMax(1e-300));
-    const Eigen::MatrixXd one_by = w * share.asDiagonal(), two_by = w2 * share.asDiagonal(),
-                          one_second = w * second.asDiagonal();
-    once = -one_by * w.transpose();
-    once.diagonal() += w.rowwise().sum();
-    const Eigen::MatrixXd cross = w2 * one_by.transpose();
-    twice = one_second * w.transpose() - cross - cross.transpose();
-    twice.diagonal() += w2.rowwise().sum();
-    const Eigen::MatrixXd uneven = w3 * one_by.transpose() - w2 * one_second.transpose();
-    thrice = w * third.asDiagonal() * w.transpose() - two_by * w2.transpose() - uneven - uneven.transpose();
-    thrice.diagonal() += w3.rowwise().sum();
-  }
-};
-
-/// tr P₀²
-double squares_less_locations(const VisitDesign& design, const Eigen::VectorXd& weight) {
-  std::vector<double> sum(design.locations), squares(design.locations), cubes(design.locations);
-  for (std::size_t v = 0; v < design.visits.size(); ++v) {
-    const double w = weight(static_cast<Eigen::Index>(v));
-    const std::size_t l = design.visits[v].location;
-    sum[l] += w;
-    squares[l] += w * w;
-    cubes[l] += w * w * w;
-  }
-  double trace = 0;
-  for (std::size_t l = 0; l < design.locations; ++l) {
-    if (sum[l] > 0) trace += squares[l] - 2 * cubes[l] / sum[l] + std::pow(squares[l] / sum[l], 2);
-  }
-  return trace;
-}
-
-/// Covariance of the two estimates: the inverse of the expected information, ½ tr(P V_k P V_l). With
-/// G = (I + σ² Zᵀ P₀ Z)⁻¹ is P = P₀ − σ² P₀ Z G Zᵀ P₀, so that nothing is larger than sessions times
-/// sessions.
-Eigen::Matrix2d covariance_of_estimates(const VisitDesign& design, const VarianceComponents& components) {
-  const auto n = static_cast<Eigen::Index>(design.visits.size());
-  const auto sessions = static_cast<Eigen::Index>(design.sessions);
-  Eigen::VectorXd weight(n);
-  for (Eigen::Index v = 0; v < n; ++v)
-    weight(v) = 1 / (components.visit + own_variance(design.visits[static_cast<std::size_t>(v)], components));
-  const auto [once, twice, thrice] = PowersOfSessions(design, weight);
-  const double session = components.session;
-  const Eigen::MatrixXd g = (Eigen::MatrixXd::Identity(sessions, sessions) + session * once)
-                                .llt()
-                                .solve(Eigen::MatrixXd::Identity(sessions, sessions));
-  const Eigen::MatrixXd g_once = g * once, g_twice = g * twice;
-  const double visit_visit =
-      0.5 * (squares_less_locations(design, weight) - 2 * session * g.cwiseProduct(thrice).sum() +
-             session * session * g_twice.cwiseProduct(g_twice.transpose()).sum());
-  const double visit_session = 0.5 * g.cwiseProduct(g_twice.transpose()).sum();
-  const double session_session = 0.5 * g_once.cwiseProduct(g_once.transpose()).sum();
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
-  if (components.visit_known && components.session_known) {
-    Eigen::Matrix2d information;
-    information << visit_visit, visit_session, visit_session, session_session;
-    covariance = information.inverse();
-  } else if (components.visit_known) {
-    covariance(0, 0) = 1 / visit_visit;
-  } else if (components.session_known) {
-    covariance(1, 1) = 1 / session_session;
-  }
-  return covariance;
-}
-
 }  // namespace
 
 VarianceComponents fit_variance_components(const GroupedRuns& runs) {
@@ -276,7 +193,6 @@ VarianceComponents fit_variance_components(const GroupedRuns& runs) {
     squares += (visit.mean - mean[visit.location]) * (visit.mean - mean[visit.location]);
   const double scale = std::max(squares / static_cast<double>(std::max<std::size_t>(freedom, 1)), 1e-300);
   maximise(design, components.visit_known, components.session_known, scale, components);
-  components.covariance = covariance_of_estimates(design, components);
   components.scatter = draw_scatter(design, components);
   return components;
 }

@@ -37,7 +37,6 @@ struct VarianceComponents {
   double run = 0;                       // pooled
   double visit = 0;
   double session = 0;
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  // of the estimates (visit, session)
   ScatterDraws scatter;
 };
 

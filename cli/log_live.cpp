@@ -121,6 +121,7 @@ class LiveLogging {
     } catch (const StorageError& error) {
       if (error.disk_full()) throw;
       warn(error.what());
+      code_ = std::max<int>(code_, kProblemFound);
       order.answer({.problem = error.what(), .text = ""});
     }
   }
@@ -189,7 +190,13 @@ class LiveLogging {
       if (key_of(planned) == key_of(*old)) again.own = planned.own;
     record(again, &order);
     if (!complete_ || !old->excluded.empty()) return;
-    exclude_run(logging_.file(), name, fmt::format("redone as {}", here_.run));
+    try {
+      exclude_run(logging_.file(), name, fmt::format("redone as {}", here_.run));
+    } catch (const StorageError& error) {
+      if (error.disk_full()) throw;
+      warn(fmt::format("run {} was redone as {} and is not excluded: {}", name, here_.run, error.what()));
+      code_ = std::max<int>(code_, kProblemFound);
+    }
     left_ = runs_left(logging_.file(), plan_);
     page_.book().look();
   }

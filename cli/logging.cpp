@@ -215,6 +215,7 @@ void Logging::mark(const std::string& name, const std::string& alarms) {
     if (!std::exchange(told, true))
       warn(fmt::format("another program is writing to {}; run {} is marked with its alarms once it has ended",
                        options_.db, name));
+    idle();
     std::this_thread::sleep_for(std::chrono::milliseconds(kMarkPause_ms));
   }
 }

@@ -126,7 +126,10 @@ class TrackerSink : public PacketSink {
   void packet(const Packet& packet) override {
     const trw_header& header = packet.header;
     const auto run = source_.boundary();
-    if (run && header.boot_id == run->boot_id && header.first_sequence < run->first_sequence) return;
+    // Only at the run's start: later such numbers are those of a restart, which the tracker knows.
+    if (run && tracker_.ledger().frames_stored == 0 && header.boot_id == run->boot_id &&
+        header.first_sequence < run->first_sequence)
+      return;
     const std::uint64_t stored = tracker_.ledger().frames_stored;
     tracker_.take(packet, time_s_, sink_);
     // What brings nothing new may be of another boot. A board may start again without a new id.
@@ -343,6 +346,7 @@ LogOutcome log_run(PacketSource& source, CampaignFile& file, const RunCells& run
       progress({.duration_s = settings.duration_s, .waiting = true, .held_up = true, .ledger = &nothing_yet});
       next = Clock::now() + kProgressInterval;
     }
+    source.idle();  // what it sends meanwhile is no part of the run
     std::this_thread::sleep_for(kTick);
   }
   std::string end_reason;

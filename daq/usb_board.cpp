@@ -120,8 +120,9 @@ std::unique_ptr<UsbBoard> UsbBoard::open(const std::shared_ptr<UsbBus>& bus, con
   }
   if (matching.empty()) {
     if (why.empty())
-      why = others.empty() ? "no board is plugged in"
-                           : fmt::format("no board of serial number {}; there are {}", serial, others);
+      why = others.empty()   ? "no board is plugged in"
+            : serial.empty() ? "the board that is plugged in does not answer"
+                             : fmt::format("no board of serial number {}; there are {}", serial, others);
     return nullptr;
   }
   std::unique_ptr<UsbBoard> board = std::move(matching.front());

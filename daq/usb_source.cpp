@@ -60,6 +60,7 @@ class UsbSource : public PacketSource {
     rest_.clear();
     break_cause_ = nullptr;
     run_begins_ = true;
+    silent_ = std::chrono::milliseconds(0);
     if (!stream_ || broken_ || !start_anew()) close();
   }
 

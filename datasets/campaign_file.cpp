@@ -107,7 +107,8 @@ bool has_no_journal(const std::filesystem::path& path) {
 /// Folds what stands only in the journal into the file, which is whole then without it. While others look on,
 /// the journal stays beside the file whoever else closes it.
 void fold_in_journal(const std::filesystem::path& path) {
-  if (has_no_journal(path)) return;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error) || has_no_journal(path)) return;
   const Database database(path.string(), SQLITE_OPEN_READWRITE);
   if (database.scalar_integer("PRAGMA wal_checkpoint(TRUNCATE)") != 0)
     throw InputError::in(

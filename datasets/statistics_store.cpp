@@ -90,20 +90,24 @@ std::map<std::int64_t, RunStatistics> all_statistics(const CampaignFile& file) {
 }
 
 void read_windows(const CampaignFile& file, std::map<std::int64_t, RunStatistics>& statistics) {
-  Statement select(
-      file.database(),
-      "SELECT raw_run, window_s, means_V, run FROM run_windows JOIN raw_runs ON raw_runs.id = raw_run");
-  while (select.step()) {
-    const auto found = statistics.find(select.integer(0));
-    if (found == statistics.end()) continue;
-    const auto blob = select.blob(2);
+  Statement select(file.database(),
+                   "SELECT window_s, means_V, run FROM run_windows JOIN raw_runs ON raw_runs.id = raw_run "
+                   "WHERE raw_run = ?");
+  for (auto& [raw_run, own] : statistics) {
+    select.bind(raw_run);
+    if (!select.step()) {
+      select.reset();
+      continue;
+    }
+    const auto blob = select.blob(1);
     if (blob.size() % sizeof(double) != 0)
       throw StorageError(fmt::format("{}: run {}: the means of its windows are damaged", file.path().string(),
-                                     select.text(3)),
+                                     select.text(2)),
                          false);
-    found->second.window_s = select.real(1);
-    found->second.window_means_V.resize(blob.size() / sizeof(double));
-    if (!blob.empty()) std::memcpy(found->second.window_means_V.data(), blob.data(), blob.size());
+    own.window_s = select.real(0);
+    own.window_means_V.resize(blob.size() / sizeof(double));
+    if (!blob.empty()) std::memcpy(own.window_means_V.data(), blob.data(), blob.size());
+    select.reset();
   }
 }
 

@@ -15,10 +15,10 @@ bool are_numbers(const Json& values) {
 }
 
 /// One for each run; null where a flight was lost.
-bool are_of_runs(const Json& values, const Json& runs) {
-  return values.is_array() && values.size() == runs.get<std::size_t>() &&
+bool are_of_runs(const Json& values, const Json& controller) {
+  return values.is_array() && values.size() == controller["runs"].get<std::size_t>() &&
          std::all_of(values.begin(), values.end(),
-                     [](const Json& v) { return v.is_number() || v.is_null(); });
+                     [&](const Json& v) { return v.is_number() || (v.is_null() && has_lost(controller)); });
 }
 
 bool is_path(const Json& path) {
@@ -52,7 +52,7 @@ std::string wrong_with(const Json& flight) {
       if (!controller.contains(key) || !(controller[key].is_number() || has_lost(controller)))
         return fmt::format("has a controller without {}", key);
     for (const char* key : {"rms_of_runs_mm", "contacts_of_runs"})
-      if (controller.contains(key) && !are_of_runs(controller[key], controller["runs"]))
+      if (controller.contains(key) && !are_of_runs(controller[key], controller))
         return fmt::format("has a controller with {} that are not one for each run", key);
     if (!controller.contains("path") || !is_path(controller["path"]) ||
         controller["path"]["y_m"].size() > flight["reference"]["y_m"].size())

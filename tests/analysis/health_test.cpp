@@ -159,7 +159,7 @@ TEST_F(Health, AnOldCertificateAndAnOpenLedger) {
     file.database().execute(
         "INSERT INTO ledgers VALUES (1, 500, 400, 50, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, NULL, NULL, NULL, NULL, "
         "'complete', "
-        "'tcp:x', 40, 400)");
+        "'tcp:x', 40, 400, '', 0)");
   }
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("the board flags frames as clipped: R1 (10 %)"));
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("the board's test pattern, no measurements: R1"));
@@ -175,7 +175,7 @@ TEST_F(Health, AConverterThatErredIsNotSaidToBeWell) {
   const Database database((folder / "c.db").string(), SQLITE_OPEN_READWRITE);
   database.execute(
       "INSERT INTO ledgers VALUES (1, 400, 400, 0, 0, 0, 0, 0, 0, 8, 0, 0, 1, 0, NULL, NULL, NULL, NULL, "
-      "'complete', 'tcp:x', 0, 0)");
+      "'complete', 'tcp:x', 0, 0, '', 0)");
   EXPECT_THAT(found(Severity::kProblem), HasSubstr("errors of its converter: R1 (2 %)"));
   EXPECT_THAT(found(Severity::kGood), testing::Not(HasSubstr("channels: ")));
 }
@@ -232,6 +232,8 @@ TEST_F(Health, TwoTaresAtOneTime) {
   EXPECT_THAT(found(Severity::kGood), testing::Not(HasSubstr("tares")));
   EXPECT_THAT(with_second_tare("2026-03-02T08:10:00Z"), testing::Not(HasSubstr("at one time")));
   EXPECT_THAT(found(Severity::kGood), HasSubstr("tares: every session has one"));
+  const CampaignData data = read_campaign_data(CampaignFile(folder / "c.db", CampaignFile::Access::kRead));
+  EXPECT_FALSE(data.statistics.at("T1").window_means_V.empty()) << "what slow noise leaves of a zero";
 }
 
 /// What `map` would refuse.

@@ -212,33 +212,6 @@ INSTANTIATE_TEST_SUITE_P(
                         .name = "TwoVisitsOfSixSessions", .per_visit = 5, .visits = 2, .u95_at_most = 0.36}),
     [](const auto& design) { return std::string(design.param.name); });
 
-/// ½ tr(P V_k P V_l), written out with a matrix of visits times visits.
-TEST(VarianceComponents, TheirCovarianceIsTheInverseInformation) {
-  std::mt19937_64 engine(7);
-  const GroupedRuns runs = simulate({.locations = 6, .sessions = 5}, 0.3, 0.2, 0.5, engine);
-  const VarianceComponents found = fit_variance_components(runs);
-  std::map<std::pair<std::size_t, std::size_t>, double> visits;  // runs of each
-  for (std::size_t i = 0; i < runs.value.size(); ++i) visits[{runs.location[i], runs.session[i]}] += 1;
-  const auto n = static_cast<Eigen::Index>(visits.size());
-  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(n, 6), z = Eigen::MatrixXd::Zero(n, 5);
-  Eigen::MatrixXd v = found.visit * Eigen::MatrixXd::Identity(n, n);
-  Eigen::Index row = 0;
-  for (const auto& [place, count] : visits) {
-    x(row, static_cast<Eigen::Index>(place.first)) = z(row, static_cast<Eigen::Index>(place.second)) = 1;
-    v(row, row) += found.run_by_location[place.first] / count;
-    ++row;
-  }
-  v += found.session * z * z.transpose();
-  const Eigen::MatrixXd w = v.inverse();
-  const Eigen::MatrixXd p = w - w * x * (x.transpose() * w * x).inverse() * x.transpose() * w;
-  const Eigen::MatrixXd p_session = p * z * z.transpose();
-  Eigen::Matrix2d information;
-  information << (p * p).trace(), (p * p_session).trace(), (p * p_session).trace(),
-      (p_session * p_session).trace();
-  const Eigen::Matrix2d expected = (0.5 * information).inverse();
-  EXPECT_LT((found.covariance - expected).norm(), 1e-9 * expected.norm());
-}
-
 /// With all matrices written out: X the locations, V the variance of the visits' means.
 double likelihood_written_out(const VisitDesign& design, double visit, double session) {
   const auto n = static_cast<Eigen::Index>(design.visits.size());

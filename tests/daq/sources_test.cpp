@@ -33,7 +33,8 @@ int in_a_computer_that_slept(const std::function<bool()>& is_well) {
   const pid_t child = ::fork();
   if (child == 0) {
     if (::unshare(CLONE_NEWTIME) != 0) ::_exit(77);
-    std::ofstream("/proc/self/timens_offsets") << "boottime 1000 0" << std::flush;
+    std::ofstream offsets("/proc/self/timens_offsets");
+    if (!(offsets << "boottime 1000 0" << std::flush)) ::_exit(77);
     const pid_t inside = ::fork();  // children of the process are in the new name space, not it itself
     if (inside == 0) ::_exit(is_well() ? 0 : 1);
     int status = 0;

@@ -8,6 +8,8 @@
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <optional>
 
 #include <gmock/gmock.h>
@@ -60,6 +62,14 @@ struct Staged : testing::Test {
     return CampaignFile(folder / "c.db", CampaignFile::Access::kRead).text("notes").value_or("");
   }
 };
+
+/// Who removes a campaign by hand may leave its journal.
+TEST_F(Staged, TakesThePlaceOfAFileThatIsGone) {
+  std::filesystem::remove(folder / "c.db");
+  std::ofstream(folder / "c.db-wal") << "what nobody needs";
+  publish("new");
+  EXPECT_EQ(text(), "new");
+}
 
 TEST_F(Staged, ReplacesNothingBeforeItIsOnTheDisk) {
   files_fail = true;

@@ -51,7 +51,7 @@ std::vector<std::vector<Components>> columns_of_best(const SearchData& data, con
 }
 
 /// Of all curves the one that does the most where its own columns stand beside the same times the scatter, or
-/// beside each group's own straight line: what a condition does where another one, with which the scatter
+/// beside its first one in each group alone: what a condition does where another one, with which the scatter
 /// goes, lets it, or in a group. None: empty.
 std::vector<Components> columns_that_go_with(const Eigen::VectorXd& scatter, const SearchData& data,
                                              const Found& found, const CurveScan& curves) {

@@ -285,6 +285,7 @@ TEST_F(LivePage, AnotherProgramThatHoldsTheFileDoesNotEndIt) {
     until_over(stream, "R0002");
   }
   EXPECT_EQ(log.command(start).status, 200);
+  until_over(stream, "R0002", "recording");
   until_over(stream, "R0002");
   EXPECT_EQ(raw_run(file(), "R0002").value().state, RunState::kComplete);
   EXPECT_EQ(log.stop(), 0);
