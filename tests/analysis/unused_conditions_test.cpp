@@ -14,7 +14,7 @@ using testing::HasSubstr;
 using testing::Not;
 
 /// Six runs whose columns for pressure, humidity and speed are these.
-CampaignData campaign(const std::string& conditions) {
+CampaignData campaign_under(const std::string& conditions) {
   std::string rows =
       "run,location,repeat,session,start_utc,raw,thrust_1_N,thrust_2_N,thrust_3_N,thrust_4_N,"
       "air_temperature_C,air_pressure_Pa,relative_humidity,speed_rpm\n";
@@ -32,7 +32,7 @@ std::string notes(const CampaignData& data, const char* terms = "thesis") {
 }
 
 TEST(UnusedConditions, APressureThatWasRecordedAndNotUsedIsSaidInPerCentOfC_TBesideU95) {
-  const CampaignData data = campaign("95000,,");
+  const CampaignData data = campaign_under("95000,,");
   EXPECT_THAT(notes(data),
               HasSubstr("pressure: taken for 101325 Pa; as recorded (95000 Pa on average) it makes "
                         "C_T 6.66 % greater than it stands here, where U95 is 0."));
@@ -41,7 +41,7 @@ TEST(UnusedConditions, APressureThatWasRecordedAndNotUsedIsSaidInPerCentOfC_TBes
 }
 
 TEST(UnusedConditions, SoAreHumidityAndSpeed) {
-  const CampaignData data = campaign(",0.5,5025");
+  const CampaignData data = campaign_under(",0.5,5025");
   EXPECT_THAT(notes(data), HasSubstr("humidity: the air is taken for dry; as recorded (50 % on average) it "
                                      "makes C_T 0.44 % greater"));
   EXPECT_THAT(notes(data), HasSubstr("speed: taken for nominal (5000 rev/min); as recorded (5025 rev/min on "
@@ -51,7 +51,7 @@ TEST(UnusedConditions, SoAreHumidityAndSpeed) {
 }
 
 TEST(UnusedConditions, WhatWasNotRecordedIsSaidToo) {
-  const std::string said = notes(campaign(",,"));
+  const std::string said = notes(campaign_under(",,"));
   for (const char* quantity : {"pressure: taken for 101325 Pa, and not recorded",
                                "humidity: the air is taken for dry, and not recorded",
                                "speed: taken for nominal (5000 rev/min), and not recorded"})
@@ -59,17 +59,17 @@ TEST(UnusedConditions, WhatWasNotRecordedIsSaidToo) {
 }
 
 TEST(UnusedConditions, TheLocationThatIsFurthestFromTheMeanIsNamed) {
-  CampaignData data = campaign("101325,,5000");
+  CampaignData data = campaign_under("101325,,5000");
   for (tunnelrig::Run& run : data.runs)
     if (run.location == "OS") run.numbers["speed_rpm"] = 4900;
   const std::string said = notes(data);
   EXPECT_THAT(said, HasSubstr("it makes C_T 2.06 % greater than it stands here, that of OS 4.12 % greater"));
-  EXPECT_THAT(notes(campaign("101325,,5000")), Not(HasSubstr("speed: taken for nominal")));
+  EXPECT_THAT(notes(campaign_under("101325,,5000")), Not(HasSubstr("speed: taken for nominal")));
   EXPECT_THAT(said, HasSubstr("C_T 0.00 % greater than it stands here, where")) << "all alike: " << said;
 }
 
 TEST(UnusedConditions, AnAdoptedEffectTakesItsConditionIn) {
-  const CampaignData data = campaign("95000,,");
+  const CampaignData data = campaign_under("95000,,");
   AppliedModel model;
   model.effect_names = {"air_pressure"};
   for (const UnusedCondition& condition : unused_conditions(data, {0, 1}, {}, model))
