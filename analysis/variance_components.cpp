@@ -11,8 +11,6 @@
 #include <map>
 #include <utility>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <unsupported/Eigen/SpecialFunctions>
 
 namespace tunnelrig {

@@ -101,6 +101,11 @@ class LiveLogging {
     page_.book().look();
   }
 
+  void found_problem(const std::string& what) {
+    warn(what);
+    code_ = std::max<int>(code_, kProblemFound);
+  }
+
   void carry_out(live::Order& order) {
     const live::Command& command = order.command;
     try {
@@ -120,8 +125,7 @@ class LiveLogging {
       order.answer({.problem = error.what(), .text = ""});
     } catch (const StorageError& error) {
       if (error.disk_full()) throw;
-      warn(error.what());
-      code_ = std::max<int>(code_, kProblemFound);
+      found_problem(error.what());
       order.answer({.problem = error.what(), .text = ""});
     }
   }
@@ -131,8 +135,7 @@ class LiveLogging {
     try {
       record(planned, nullptr);
     } catch (const InputError& error) {
-      warn(error.what());
-      code_ = std::max<int>(code_, kProblemFound);
+      found_problem(error.what());
     }
   }
 
@@ -194,8 +197,8 @@ class LiveLogging {
       exclude_run(logging_.file(), name, fmt::format("redone as {}", here_.run));
     } catch (const StorageError& error) {
       if (error.disk_full()) throw;
-      warn(fmt::format("run {} was redone as {} and is not excluded: {}", name, here_.run, error.what()));
-      code_ = std::max<int>(code_, kProblemFound);
+      found_problem(
+          fmt::format("run {} was redone as {} and is not excluded: {}", name, here_.run, error.what()));
     }
     left_ = runs_left(logging_.file(), plan_);
     page_.book().look();

@@ -65,7 +65,7 @@ std::string offset_text(const RigOffset& offset) {
              : fmt::format("{} ± {} %", value, rounded_text(offset.u95_percent, decimals));
 }
 
-void print(const WrittenMaps& written) {
+void print(const WrittenMaps& written, double beyond) {
   Table table(
       {"map", "lowest [%]", "highest [%]", "median U95 [%]", "leave-one-out rms [%]", "standardised"});
   const auto row = [&](const char* name, const MapLayer& layer, const FitSummary& fit) {
@@ -87,16 +87,15 @@ void print(const WrittenMaps& written) {
   fmt::print("\n");
   if (const auto& offset = written.map.uneven_thrust_fit.offset)
     fmt::print("offset of the rig in U, taken out of the map: {}\n", offset_text(*offset));
-  fmt::print("{:.0f} % of the square is beyond the locations and their mirror images\n",
-             100 * measured_region(written.map).share_outside());
+  fmt::print("{:.0f} % of the square is beyond the locations and their mirror images\n", 100 * beyond);
   fmt::print("{} locations, {}; {} files in {}\n", written.map.locations.size(), written.map.method,
              written.files.size(), written.files.empty() ? "" : written.files[0].parent_path().string());
 }
 
-/// Where no location is on the far side, neither method's uncertainty holds what it says.
-void warn_of_extrapolation(const DisturbanceMap& map) {
+/// Where no location is on the far side, neither method's uncertainty holds what it says. `share`: of the
+/// square.
+void warn_of_extrapolation(double share) {
   constexpr double kMore = 0.1;  // than around the thesis's locations, which leave 6 %
-  const double share = measured_region(map).share_outside();
   if (share <= kMore) return;
   warn(fmt::format(
       "{:.0f} % of the square is beyond the measured locations and their mirror images (hatched): "
@@ -164,7 +163,8 @@ int run_map(const MapOptions& options) {
                     "(check propellers.csv, "
                     "arms, cells); it has been taken out of the map",
                     offset_text(*offset)));
-  warn_of_extrapolation(written.map);
+  const double beyond = measured_region(written.map).share_outside();
+  warn_of_extrapolation(beyond);
   if (written.warning) warn(*written.warning);
   if (options.json) {
     nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},
@@ -172,13 +172,13 @@ int run_map(const MapOptions& options) {
                                 {"model", reduction.model_name()},
                                 {"locations", written.map.locations.size()},
                                 {"not_on_the_map", not_on_map},
-                                {"beyond_percent", 100 * measured_region(written.map).share_outside()},
+                                {"beyond_percent", 100 * beyond},
                                 {"delta_ct", fit_json(written.map.delta_ct_fit)},
                                 {"uneven_thrust", fit_json(written.map.uneven_thrust_fit)}};
     for (const auto& path : written.files) json["files"].push_back(path.string());
     fmt::print("{}\n", json.dump(1));
   } else {
-    print(written);
+    print(written, beyond);
     fmt::print("model {}\n", reduction.model_name());
   }
   return problem ? kProblemFound : kWell;

@@ -3,6 +3,18 @@
 #include "datasets/sqlite.h"
 
 namespace tunnelrig {
+namespace {
+
+/// Of a row of what both statements below select.
+Document document_of(const Statement& select, std::string_view kind) {
+  return {.id = select.integer(0),
+          .kind = std::string(kind),
+          .created_utc = select.text(1),
+          .provenance = {select.text(2), select.text(3), select.text(4)},
+          .json = select.text(5)};
+}
+
+}  // namespace
 
 std::int64_t CampaignFile::add_document(std::string_view kind, const Provenance& provenance,
                                         std::string_view json) {
@@ -25,13 +37,7 @@ std::vector<Document> CampaignFile::documents(std::string_view kind) const {
                    "FROM documents WHERE kind = ? ORDER BY id");
   select.bind(kind);
   std::vector<Document> found;
-  while (select.step()) {
-    found.push_back({.id = select.integer(0),
-                     .kind = std::string(kind),
-                     .created_utc = select.text(1),
-                     .provenance = {select.text(2), select.text(3), select.text(4)},
-                     .json = select.text(5)});
-  }
+  while (select.step()) found.push_back(document_of(select, kind));
   return found;
 }
 
@@ -41,11 +47,7 @@ std::optional<Document> CampaignFile::newest_document(std::string_view kind) con
                    "FROM documents WHERE kind = ? ORDER BY id DESC LIMIT 1");
   select.bind(kind);
   if (!select.step()) return {};
-  return Document{.id = select.integer(0),
-                  .kind = std::string(kind),
-                  .created_utc = select.text(1),
-                  .provenance = {select.text(2), select.text(3), select.text(4)},
-                  .json = select.text(5)};
+  return document_of(select, kind);
 }
 
 }  // namespace tunnelrig

@@ -49,6 +49,20 @@ bool baseline_does_better(const Explanation& explanation) {
          explanation.sealed.against_adopted;
 }
 
+bool holds_0(const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; }
+
+/// Curves of the model over an effect's own conditions.
+std::vector<const UnknownStructure*> curves_beside(const AdoptedEffect& adopted,
+                                                   const Explanation& explanation,
+                                                   const Observations& observations) {
+  const std::vector<std::string> own = own_conditions(*adopted.term.effect, observations);
+  std::vector<const UnknownStructure*> result;
+  for (const UnknownStructure& curve : explanation.unknown)
+    if (!curve.by_sealed_too && std::ranges::find(own, curve.condition) != own.end())
+      result.push_back(&curve);
+  return result;
+}
+
 /// A curve over its own condition beside it, in words, where the names alone make the error larger: of single
 /// rotors beside what it says of all, it may be no more than what these leave of each other; of the same
 /// rotors it is what the curve takes back.
@@ -56,16 +70,14 @@ std::string contradiction(const AdoptedEffect& adopted, const Explanation& expla
                           const Observations& observations) {
   const double after = explanation.after.held_out_rmse, before = explanation.before.held_out_rmse;
   if (after <= before) return "";
-  const std::vector<std::string> own = own_conditions(*adopted.term.effect, observations);
-  for (const UnknownStructure& curve : explanation.unknown) {
-    if (curve.by_sealed_too || std::ranges::find(own, curve.condition) == own.end()) continue;
-    if (adopted.term.rotor < 0 && curve.rotor >= 0)
+  for (const UnknownStructure* curve : curves_beside(adopted, explanation, observations)) {
+    if (adopted.term.rotor < 0 && curve->rotor >= 0)
       return fmt::format(
           "curves of single rotors over {} say otherwise, and without them it makes the error larger",
-          curve.condition);
-    if (adopted.term.rotor == curve.rotor && is_worse(after, before))
+          curve->condition);
+    if (adopted.term.rotor == curve->rotor && is_worse(after, before))
       return fmt::format("a curve over {} takes it back, and without that it makes the error larger",
-                         curve.condition);
+                         curve->condition);
   }
   return "";
 }
@@ -74,13 +86,9 @@ std::string contradiction(const AdoptedEffect& adopted, const Explanation& expla
 /// was found for.
 bool has_given_way(const AdoptedEffect& adopted, const Explanation& explanation,
                    const Observations& observations) {
-  const ParameterEstimate& amplitude = adopted.parameters[0];
-  if (adopted.term.per_group || amplitude.low > 0 || amplitude.high < 0) return false;
-  const std::vector<std::string> own = own_conditions(*adopted.term.effect, observations);
-  return std::ranges::any_of(explanation.unknown, [&](const UnknownStructure& curve) {
-    return !curve.by_sealed_too && curve.rotor == adopted.term.rotor &&
-           std::ranges::find(own, curve.condition) != own.end();
-  });
+  return !adopted.term.per_group && holds_0(adopted.parameters[0]) &&
+         std::ranges::count(curves_beside(adopted, explanation, observations), adopted.term.rotor,
+                            &UnknownStructure::rotor) > 0;
 }
 
 /// What speaks against a name.
@@ -234,10 +242,11 @@ std::string refutation(const AdoptedEffect& adopted, const Observations& observa
     if (by.empty()) by = {"the force"};
     return fmt::format("what goes with {} bends away from its formula", fmt::join(by, ", "));
   }
-  const auto holds_0 = [](const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; };
   // Where groups have their own, these may be of either sign, and nothing on the whole.
   const bool nothing =
-      adopted.term.per_group ? std::ranges::all_of(amplitude.groups, holds_0) : holds_0(amplitude);
+      adopted.term.per_group
+          ? std::ranges::all_of(amplitude.groups, [](const auto& group) { return holds_0(group); })
+          : holds_0(amplitude);
   return nothing ? fmt::format("the 95 % interval of its {} holds 0", amplitude.name) : "";
 }
 

@@ -18,10 +18,7 @@ namespace tunnelrig {
 namespace {
 
 void add_curve(const SearchData& data, Found& found, const Curve& curve, double p) {
-  MeanModel model = found.fit.model;
-  model.curves.push_back(curve);
-  found.add_curve({.curve = curve, .p = p, .instead_of = {}},
-                  fit_jointly(data.observations(), model, data.rows()));
+  found.add_curve({.curve = curve, .p = p, .instead_of = {}}, fit_with_curve(data, found.fit, curve));
 }
 
 void set_curve(const SearchData& data, Found& found, std::size_t c, const Curve& form) {

@@ -40,6 +40,12 @@ JointFit fit_without(const SearchData& data, const JointFit& base, std::size_t t
   return fit_jointly(data.observations(), base.model.without_term(t), data.rows());
 }
 
+JointFit fit_with_curve(const SearchData& data, const JointFit& base, const Curve& curve) {
+  MeanModel model = base.model;
+  model.curves.push_back(curve);
+  return fit_jointly(data.observations(), model, data.rows());
+}
+
 JointFit fit_without_curve(const SearchData& data, const JointFit& base, std::size_t c) {
   MeanModel model = base.model;
   model.curves.erase(model.curves.begin() + static_cast<std::ptrdiff_t>(c));

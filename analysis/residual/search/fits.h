@@ -21,6 +21,9 @@ JointFit fit_with_all(const SearchData& data, const JointFit& base, const std::v
 /// Without term t.
 JointFit fit_without(const SearchData& data, const JointFit& base, std::size_t t);
 
+/// With a curve as its last.
+JointFit fit_with_curve(const SearchData& data, const JointFit& base, const Curve& curve);
+
 /// Without curve c.
 JointFit fit_without_curve(const SearchData& data, const JointFit& base, std::size_t c);
 

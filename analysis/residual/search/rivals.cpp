@@ -19,6 +19,8 @@ namespace {
 
 using Eigen::Index;
 
+constexpr int kMostWays = 3;  // of each cause are tried
+
 bool within_bounds(const Term& way, const CandidateFit& fit) {
   const EffectParameter& amplitude = way.effect->parameters[0];
   return fit.amplitude(0) >= amplitude.lower && fit.amplitude(0) <= amplitude.upper;
@@ -91,7 +93,7 @@ std::vector<Ranked> rivals(const SearchData& data, const Found& found, const Acc
   for (const std::size_t i : scan.order) {
     if (scan.fits[i].evidence < found.critical) break;
     const std::string cause = scan.ways[i].effect->cause();
-    if (std::count(done.begin(), done.end(), cause) >= 3) continue;  // three ways of each are tried
+    if (std::count(done.begin(), done.end(), cause) >= kMostWays) continue;
     done.push_back(cause);
     if (cause == accepted.term.effect->cause() ||
         std::ranges::any_of(result, [&](const Ranked& r) { return r.term.effect->cause() == cause; }))
@@ -155,7 +157,6 @@ std::vector<Ranked> still_rivals_of(const SearchData& data, const Found& found, 
   const std::optional<CrossValidation> own = validate.of_same(accepted.term, scan);
   if (!own) return accepted.confounded;
   const auto is_told_apart = [&](const Ranked& rival) {
-    constexpr int kMostWays = 3;
     int tried = 0;
     for (const std::size_t i : scan.order) {
       if (scan.ways[i].effect->cause() != rival.term.effect->cause()) continue;

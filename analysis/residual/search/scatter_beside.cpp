@@ -7,6 +7,7 @@
 #include "analysis/residual/scatter/run_correlation.h"
 #include "analysis/residual/search/curve_scan.h"
 #include "analysis/residual/search/draws.h"
+#include "analysis/residual/search/fits.h"
 #include "analysis/residual/search/group_amplitudes.h"
 #include "analysis/residual/search/unseen.h"
 
@@ -31,24 +32,7 @@ struct ScatterBeside {
   ScatterFit scatter;
 };
 
-/// The best curves one after the other, a scan for each; the first is that of `curves`.
-std::vector<std::vector<Components>> columns_of_best(const SearchData& data, const Found& found,
-                                                     const CurveScan& curves) {
-  constexpr std::size_t kMost = 3;
-  std::vector<std::vector<Components>> result;
-  Found with = found;
-  CurveScan next;
-  for (const CurveScan* scan = &curves; !scan->tried.empty(); scan = &next) {
-    const Curve best = scan->tried[scan->scan.order[0]];
-    result.push_back(columns_with(with.fit, best.columns));
-    if (result.size() == kMost) break;
-    MeanModel model = with.fit.model;
-    model.curves.push_back(best);
-    with.add_curve({.curve = best, .instead_of = {}}, fit_jointly(data.observations(), model, data.rows()));
-    next = scan_curves(data, with);
-  }
-  return result;
-}
+const Curve& best_of(const CurveScan& curves) { return curves.tried[curves.scan.order[0]]; }
 
 /// Of all curves the one that does the most where its own columns stand beside the same times the scatter, or
 /// beside its first one in each group alone: what a condition does where another one, with which the scatter
@@ -101,17 +85,25 @@ ScatterBeside scatter_beside(const SearchData& data, const Found& found, const C
   };
   ScatterBeside alone = beside(found.fit.linear.columns);
   if (curves.tried.empty() || curves.scan.fits[curves.scan.order[0]].evidence < least_evidence) return alone;
-  ScatterBeside with = beside(columns_with(found.fit, curves.tried[curves.scan.order[0]].columns));
+  ScatterBeside with = beside(columns_with(found.fit, best_of(curves).columns));
   if (alone.scatter.by_condition.names.empty()) return with;
   // A curve may be the scatter of a few runs far out on a condition, and scatter a curve.
   ScatterBeside best = likelihood(alone) > likelihood(with) ? alone : std::move(with);
   double most = likelihood(best);
   // What acts in a part of the runs only is a scatter to any single curve.
   const double of_choice = std::log(static_cast<double>(curves.tried.size()));
-  const auto several = columns_of_best(data, found, curves);
-  for (std::size_t k = 1; k < several.size() && !best.scatter.by_condition.names.empty(); ++k) {
-    ScatterBeside more = beside(several[k]);
-    const double of_more = likelihood(more) - static_cast<double>(k) * of_choice;
+  constexpr int kMostCurves = 3;
+  Found further = found;
+  CurveScan next;
+  const CurveScan* scan = &curves;
+  for (int k = 1; k < kMostCurves && !best.scatter.by_condition.names.empty(); ++k) {
+    const Curve& last = best_of(*scan);
+    further.add_curve({.curve = last, .instead_of = {}}, fit_with_curve(data, further.fit, last));
+    next = scan_curves(data, further);
+    scan = &next;
+    if (next.tried.empty()) break;
+    ScatterBeside more = beside(columns_with(further.fit, best_of(next).columns));
+    const double of_more = likelihood(more) - k * of_choice;
     if (of_more <= most) continue;
     best = std::move(more);
     most = of_more;
