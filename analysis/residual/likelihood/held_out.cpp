@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 
 namespace tunnelrig {
 namespace {
@@ -14,19 +13,28 @@ using Eigen::VectorXd;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+double weight_of(double sigma) { return 1 / std::max(sigma * sigma, 1e-300); }
+
+/// Normal equations of the amplitudes, a x = b, the baseline taken out of both.
+struct NormalEquations {
+  MatrixXd a;
+  VectorXd b;
+  VectorXd plain;  // the columns' squares with the baseline still in them
+};
+
 /// What the fit leaves for prediction: everything stratum by stratum.
 struct Fit {
   VectorXd amplitude;
   MatrixXd covariance;              // of the amplitudes
   std::vector<Stacked> y, columns;  // of the fitted runs
+  NormalEquations equations;
 };
 
 Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vector<const Components*>& items,
                    const NullFit& null) {
   const Index k = static_cast<Index>(items.size());
-  Fit fit{VectorXd::Zero(k), MatrixXd::Zero(k, k), {}, {}};
-  MatrixXd a = MatrixXd::Zero(k, k);
-  VectorXd b = VectorXd::Zero(k);
+  Fit fit{VectorXd::Zero(k), MatrixXd::Zero(k, k), {}, {}, {}};
+  NormalEquations& e = fit.equations = {MatrixXd::Zero(k, k), VectorXd::Zero(k), VectorXd::Zero(k)};
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
     fit.y.push_back(model.stack(s, {&y}));
     fit.columns.push_back(model.stack(s, items));
@@ -34,16 +42,31 @@ Fit fit_amplitudes(const MixedModel& model, const Components& y, const std::vect
     Stacked projected_y = fit.y[s], projected = fit.columns[s];
     model.project(s, null.ratio[s], projected_y);
     model.project(s, null.ratio[s], projected);
-    const double weight = 1 / std::max(null.sigma[s] * null.sigma[s], 1e-300);
-    a += weight * projected.transpose() * projected;
-    b += weight * projected.transpose() * projected_y.col(0);
+    const double weight = weight_of(null.sigma[s]);
+    e.a += weight * projected.transpose() * projected;
+    e.b += weight * projected.transpose() * projected_y.col(0);
+    e.plain += weight * fit.columns[s].colwise().squaredNorm().transpose();
   }
   if (k == 0) return fit;
   // Collinear columns share their amplitude instead of running away.
-  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(a);
-  fit.amplitude = solver.solve(b);
+  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(e.a);
+  fit.amplitude = solver.solve(e.b);
   fit.covariance = solver.pseudoInverse();
   return fit;
+}
+
+/// Directions of the amplitudes that the fitted runs say nothing of, k × directions: a column that the
+/// baseline has in it there, or that is 0 there, and sums of columns that cancel there. `plain`: the columns'
+/// squares over the runs to predict; along a direction a run there changes by 1 at most.
+MatrixXd undetermined(const NormalEquations& e, const VectorXd& plain) {
+  constexpr double kAbsorbed = 1e-20, kCollinear = 1e-14;  // shares of squares that are rounding
+  const VectorXd whole = e.plain + plain, own = e.a.diagonal();
+  const auto absorbed = own.array() <= kAbsorbed * whole.array();
+  const VectorXd scale = absorbed.select(0, own.cwiseMax(1e-300).cwiseSqrt().cwiseInverse());
+  const VectorXd unit = absorbed.select(whole.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), scale);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(scale.asDiagonal() * e.a * scale.asDiagonal());
+  const Index count = (solver.eigenvalues().array() < kCollinear).count();  // they ascend
+  return unit.asDiagonal() * solver.eigenvectors().leftCols(count);
 }
 
 /// What runs and their sessions scatter, σ² (U Φ U + a J) of (2); neighbours are those of the same block
@@ -88,15 +111,25 @@ class RunCovariance {
   double correlation_;
 };
 
+/// What one stratum's model says of runs that it has not seen.
+struct StratumErrors {
+  MatrixXd error, variance;  // runs × modes
+  Stacked columns;           // the baseline taken out
+};
+
+/// y and the columns of the runs to predict, without a baseline.
+struct Plain {
+  Stacked y, columns;
+};
+
 /// Where whole groups are held out, a group's constant and slopes are fitted to every other run of it; the
-/// rest is scored, if there are as many runs as coefficients. `residual` came with NaN there because the
-/// model has no such group: `plain` is the same without any baseline. `covariance`: of what runs scatter;
-/// `columns`: stacked, of amplitudes that have `of_amplitudes`.
+/// rest is scored, if there are as many runs as coefficients. `result` came with NaN there because the
+/// model has no such group; its variances get what runs scatter, `covariance`, not yet what amplitudes do.
 void fit_own_baselines(const Observations& observations, const std::vector<int>& rows,
                        const std::vector<OwnBaseline>& own_groups, const RunCovariance& covariance,
-                       const MatrixXd& plain, const Stacked& columns, const MatrixXd& of_amplitudes,
-                       MatrixXd& residual, MatrixXd& variance) {
+                       const Plain& plain, StratumErrors& result) {
   const MatrixXd design = observations.baseline_columns(rows);
+  const Index n = static_cast<Index>(rows.size());
   for (const auto& [fitted, scored] : own_groups) {
     const MatrixXd of_fitted = covariance(fitted, fitted), shared = covariance(scored, fitted);
     const VectorXd weight = covariance.of_runs(fitted).cwiseInverse();
@@ -104,18 +137,18 @@ void fit_own_baselines(const Observations& observations, const std::vector<int>&
     if (x.rows() < x.cols()) continue;
     const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(x);
     const MatrixXd share = wanted * solver.pseudoInverse() * weight.asDiagonal();  // of each fitted run
-    residual(scored, Eigen::all) = plain(scored, Eigen::all) - share * plain(fitted, Eigen::all);
+    for (Index mode = 0; mode < result.error.cols(); ++mode) {
+      const auto y = plain.y.middleRows(mode * n, n), columns = plain.columns.middleRows(mode * n, n);
+      result.error(scored, mode) = y(scored, 0) - share * y(fitted, 0);
+      result.columns.middleRows(mode * n, n)(scored, Eigen::all) =
+          columns(scored, Eigen::all) - share * columns(fitted, Eigen::all);
+    }
     // What a run shares with its neighbours is in the group's own constant as well.
     for (std::size_t m = 0; m < scored.size(); ++m) {
       const auto w = share.row(static_cast<Index>(m));
-      variance.row(scored[m]).setConstant(covariance({scored[m]}, {scored[m]})(0, 0) -
-                                          2 * w.dot(shared.row(static_cast<Index>(m))) +
-                                          w.dot(w * of_fitted));
-    }
-    for (Index mode = 0; mode < variance.cols() && columns.cols() > 0; ++mode) {
-      const auto own = columns.middleRows(mode * variance.rows(), variance.rows());
-      const MatrixXd left = own(scored, Eigen::all) - share * own(fitted, Eigen::all);
-      variance(scored, mode) += (left * of_amplitudes).cwiseProduct(left).rowwise().sum();
+      result.variance.row(scored[m]).setConstant(covariance({scored[m]}, {scored[m]})(0, 0) -
+                                                 2 * w.dot(shared.row(static_cast<Index>(m))) +
+                                                 w.dot(w * of_fitted));
     }
   }
 }
@@ -144,16 +177,12 @@ VectorXd concatenated(const std::vector<VectorXd>& parts) {
   return result;
 }
 
-/// What one stratum's model says of runs that it has not seen: errors and variances, runs × modes.
-struct StratumErrors {
-  MatrixXd error, variance;
-  VectorXd whitened;
-};
-
-/// y and the columns of the runs to predict, without a baseline.
-struct Plain {
-  Stacked y, columns;
-};
+/// What runs scatter by, over σ.
+VectorXd scatter_of(const Observations& observations, const MixedModel::Stratum& stratum,
+                    const std::vector<int>& rows) {
+  if (stratum.means()) return observations.scatter.of_runs(rows);
+  return VectorXd::Ones(static_cast<Index>(rows.size()));
+}
 
 StratumErrors errors_of_stratum(const Observations& observations, const MixedModel& model, std::size_t s,
                                 const Fit& fit, const NullFit& null, Plain plain,
@@ -161,26 +190,53 @@ StratumErrors errors_of_stratum(const Observations& observations, const MixedMod
   const MixedModel::Stratum& stratum = model.strata()[s];
   const Index n = static_cast<Index>(rows.size());
   const double sigma = null.sigma[s], ratio = kRatios[null.ratio[s]];
-  const VectorXd scatter = stratum.means() ? observations.scatter.of_runs(rows) : VectorXd(VectorXd::Ones(n));
+  const VectorXd scatter = scatter_of(observations, stratum, rows);
   Stacked residual = plain.y - model.baseline_prediction(s, null.ratio[s], fit.y[s], rows);
-  Stacked variance = (scatter.array().square() + ratio).replicate(stratum.modes, 1);
-  variance += model.baseline_variance(s, null.ratio[s], rows).replicate(stratum.modes, 1);
-  variance *= sigma * sigma;
+  StratumErrors result{{}, {}, plain.columns};
   if (plain.columns.cols() > 0) {
-    const Stacked x = plain.columns - model.baseline_prediction(s, null.ratio[s], fit.columns[s], rows);
+    result.columns -= model.baseline_prediction(s, null.ratio[s], fit.columns[s], rows);
+    residual -= result.columns * fit.amplitude;
     plain.y -= plain.columns * fit.amplitude;
-    residual -= x * fit.amplitude;
-    variance += ((x * fit.covariance).array() * x.array()).rowwise().sum().matrix();
   }
-  StratumErrors result{residual.reshaped(n, stratum.modes), variance.reshaped(n, stratum.modes), {}};
+  result.error = residual.reshaped(n, stratum.modes);
+  const VectorXd variance =
+      sigma * sigma *
+      (scatter.array().square() + ratio + model.baseline_variance(s, null.ratio[s], rows).array());
+  result.variance = variance.replicate(1, stratum.modes);
   if (stratum.means() && !own_groups.empty())
     fit_own_baselines(observations, rows, own_groups,
                       RunCovariance(observations, rows, scatter, sigma, ratio, model.run_correlation(s)),
-                      plain.y.reshaped(n, stratum.modes), plain.columns, fit.covariance, result.error,
-                      result.variance);
-  result.whitened =
-      whitened(observations, rows, result.error, scatter, sigma, ratio, model.run_correlation(s));
+                      plain, result);
+  if (plain.columns.cols() > 0) {
+    const Stacked& x = result.columns;
+    result.variance +=
+        ((x * fit.covariance).array() * x.array()).rowwise().sum().matrix().reshaped(n, stratum.modes);
+  }
   return result;
+}
+
+/// Takes the errors of the runs on which an effect acts whose amplitude the fitted runs leave undetermined:
+/// in its place would stand what the columns were linearised at, in which these runs have had their part.
+void remove_unpredictable(const MixedModel& model, const NullFit& null, const Fit& fit,
+                          const std::vector<Plain>& plain, std::vector<StratumErrors>& strata) {
+  constexpr double kRounding = 1e-6;
+  if (fit.amplitude.size() == 0) return;
+  VectorXd squares = VectorXd::Zero(fit.amplitude.size());
+  for (std::size_t s = 0; s < strata.size(); ++s)
+    squares += weight_of(null.sigma[s]) * plain[s].columns.colwise().squaredNorm().transpose();
+  const MatrixXd directions = undetermined(fit.equations, squares);
+  if (directions.cols() == 0) return;
+  Eigen::Array<bool, Eigen::Dynamic, 1> unknown =
+      Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(strata.front().error.rows(), false);
+  for (std::size_t s = 0; s < strata.size(); ++s) {
+    const double weight = std::sqrt(weight_of(null.sigma[s]));
+    const VectorXd largest = weight * (strata[s].columns * directions).cwiseAbs().rowwise().maxCoeff();
+    unknown = unknown ||
+              (largest.reshaped(unknown.size(), model.strata()[s].modes).array() > kRounding).rowwise().any();
+  }
+  for (StratumErrors& stratum : strata)
+    for (Index mode = 0; mode < stratum.error.cols(); ++mode)
+      stratum.error.col(mode) = unknown.select(kNaN, stratum.error.col(mode).array());
 }
 
 /// From errors of y and what they scatter by.
@@ -220,17 +276,25 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
   const std::vector<const Components*> items = pointers_to(columns);
   const Fit fit = fit_amplitudes(model, y, items, null);
   const std::vector<OwnBaseline> own_groups = own_baselines(observations, fit_rows, test_rows);
+  std::vector<Plain> plain;
+  std::vector<StratumErrors> strata;
+  for (std::size_t s = 0; s < model.strata().size(); ++s) {
+    plain.push_back({test.stack(s, {&y}), test.stack(s, items)});
+    strata.push_back(
+        errors_of_stratum(observations, model, s, fit, null, plain.back(), test_rows, own_groups));
+  }
+  remove_unpredictable(model, null, fit, plain, strata);
   const Index n = static_cast<Index>(test_rows.size()), c = observations.channels();
   std::vector<VectorXd> parts;
   MatrixXd error_by_mode = MatrixXd::Zero(n, c), variance_by_mode = MatrixXd::Zero(n, c);
   for (std::size_t s = 0; s < model.strata().size(); ++s) {
     const MixedModel::Stratum& stratum = model.strata()[s];
-    StratumErrors own = errors_of_stratum(observations, model, s, fit, null,
-                                          {test.stack(s, {&y}), test.stack(s, items)}, test_rows, own_groups);
-    parts.push_back(std::move(own.whitened));
+    parts.push_back(whitened(observations, test_rows, strata[s].error,
+                             scatter_of(observations, stratum, test_rows), null.sigma[s],
+                             kRatios[null.ratio[s]], model.run_correlation(s)));
     if (!stratum.means()) continue;
-    error_by_mode.middleCols(stratum.first_mode, stratum.modes) = own.error;
-    variance_by_mode.middleCols(stratum.first_mode, stratum.modes) = own.variance;
+    error_by_mode.middleCols(stratum.first_mode, stratum.modes) = strata[s].error;
+    variance_by_mode.middleCols(stratum.first_mode, stratum.modes) = strata[s].variance;
   }
   HeldOutErrors result{test_rows, {}, {}, concatenated(parts), fit.amplitude};
   set_in_response_unit(observations, error_by_mode * model.rotors_of_modes(),
@@ -250,82 +314,6 @@ std::vector<OwnBaseline> own_baselines(const Observations& observations, const s
       (m % 2 == 0 ? own.fitted : own.scored).push_back(members[m]);
   }
   return result;
-}
-
-std::vector<Fold> leave_out_blocks(const Observations& observations, const std::vector<int>& rows) {
-  std::map<int, std::size_t> fold_of;
-  for (const int row : rows) fold_of.emplace(observations.block[static_cast<std::size_t>(row)], 0);
-  std::size_t next = 0;
-  for (auto& [block, fold] : fold_of) fold = next++ % kMostFolds;
-  std::vector<Fold> folds(std::min(fold_of.size(), kMostFolds));
-  for (const int row : rows) {
-    const std::size_t own = fold_of.at(observations.block[static_cast<std::size_t>(row)]);
-    for (std::size_t fold = 0; fold < folds.size(); ++fold)
-      (fold == own ? folds[fold].left_out : folds[fold].kept).push_back(row);
-  }
-  return folds;
-}
-
-CrossValidation cross_validate(const Observations& observations, const Components& y,
-                               const std::vector<Components>& columns, const NullFit& null,
-                               const std::vector<int>& rows) {
-  CrossValidation result;
-  for (const Fold& fold : leave_out_blocks(observations, rows))
-    result.folds.push_back(predict_held_out(observations, y, columns, null, fold.kept, fold.left_out));
-  return result;
-}
-
-double CrossValidation::rmse() const {
-  double squares = 0;
-  Index count = 0;
-  for (const HeldOutErrors& fold : folds) {
-    squares += fold.sum_of_squares();
-    count += fold.count();
-  }
-  return count == 0 ? kNaN : std::sqrt(squares / static_cast<double>(count));
-}
-
-HeldOutErrors CrossValidation::all() const {
-  HeldOutErrors result;
-  for (const HeldOutErrors& fold : folds) {
-    const Index before = result.error.rows();
-    result.rows.insert(result.rows.end(), fold.rows.begin(), fold.rows.end());
-    const Index rows = before + fold.error.rows();
-    result.error.conservativeResize(rows, fold.error.cols());
-    result.error.bottomRows(fold.error.rows()) = fold.error;
-    result.expected_std.conservativeResize(rows, fold.error.cols());
-    result.expected_std.bottomRows(fold.error.rows()) = fold.expected_std;
-  }
-  return result;
-}
-
-VectorXd CrossValidation::losses() const {
-  VectorXd result(static_cast<Index>(folds.size()));
-  for (std::size_t fold = 0; fold < folds.size(); ++fold)
-    result(static_cast<Index>(fold)) = folds[fold].loss();
-  return result;
-}
-
-LossDifference compare(const CrossValidation& worse, const CrossValidation& better) {
-  VectorXd difference = worse.losses() - better.losses();
-  double distance2 = 0;
-  for (std::size_t fold = 0; fold < worse.folds.size(); ++fold)
-    // Where one of them has too few runs for its coefficients, they are not held against the same runs.
-    if (worse.folds[fold].count() != better.folds[fold].count())
-      difference(static_cast<Index>(fold)) = 0;
-    else
-      distance2 += (worse.folds[fold].whitened - better.folds[fold].whitened).squaredNorm();
-  const double n = static_cast<double>(difference.size());
-  LossDifference result{.mean = difference.mean(), .total = difference.sum()};
-  result.standard_error = std::sqrt((difference.array() - result.mean).square().sum() / (n * (n - 1)));
-  result.expected_standard_error = 2 * std::sqrt(distance2) / n;
-  return result;
-}
-
-bool LossDifference::told_apart() const {
-  constexpr double kLikelihoodRatio = 20;
-  return mean >= 2 * std::min(standard_error, expected_standard_error) &&
-         total >= 2 * std::log(kLikelihoodRatio);
 }
 
 }  // namespace tunnelrig

@@ -1,5 +1,7 @@
 #include "analysis/residual/likelihood/scores.h"
 
+#include "analysis/residual/likelihood/cross_validation.h"
+
 #include <cmath>
 
 namespace tunnelrig {

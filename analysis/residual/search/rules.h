@@ -1,6 +1,7 @@
 // What a candidate beyond chance must not be, to get its name.
 #pragma once
 
+#include "analysis/residual/likelihood/cross_validation.h"
 #include "analysis/residual/search/found.h"
 #include "analysis/residual/search/search_data.h"
 

@@ -1,6 +1,7 @@
 // How well models predict blocks of the runs that their fit did not see.
 #pragma once
 
+#include "analysis/residual/likelihood/cross_validation.h"
 #include "analysis/residual/search/search_data.h"
 
 #include <vector>

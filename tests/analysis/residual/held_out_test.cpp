@@ -1,6 +1,5 @@
 // Prediction of runs that the fit did not see.
-#include "analysis/residual/likelihood/held_out.h"
-
+#include "analysis/residual/likelihood/cross_validation.h"
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 
@@ -303,6 +302,51 @@ TEST_P(HeldOut, WhereTheGroupIsTheBlockItsConstantComesFromEveryOtherRun) {
       EXPECT_NEAR(errors.expected_std(static_cast<Index>(r), c), 0.002 * std::sqrt(1 + 1 / 3.0), 1e-12);
     }
   }
+}
+
+/// What only held-out runs tell has no error there, or what they told the linearisation would be its own
+/// proof: a column of one block, and one that the others' baseline has in it.
+TEST_P(HeldOut, RunsOfAnAmplitudeThatTheFitLeavesUndeterminedAreNotScored) {
+  std::mt19937_64 random(test::seed() + 8);
+  const Observations o = test::simulate({.channels = GetParam()}, random);
+  const Split split = split_blocks(o);
+  const NullFit null = known_variances(o, 0.002, 2);
+  const auto in_block = [&](int row) { return o.block[static_cast<std::size_t>(row)] == 4; };
+  const auto in_group = [&](int row) { return o.group[static_cast<std::size_t>(row)] == 1; };
+  MatrixXd of_one_block = MatrixXd::Zero(o.rows(), GetParam()), of_one_group = of_one_block;
+  for (const int row : o.all_rows())
+    if (in_block(row)) of_one_block.row(row).setConstant(0.3 + 0.1 * row);
+  for (const int row : split.fit)
+    if (in_group(row)) of_one_group.row(row).setConstant(2);
+  for (const int row : split.test)
+    if (in_group(row)) of_one_group.row(row).setConstant(5 + row);
+  const MatrixXd shared = normal(o.rows(), GetParam(), random);
+  const auto predicted = [&](const std::vector<Components>& columns) {
+    return predict_held_out(o, {o.y}, columns, null, split.fit, split.test);
+  };
+  const HeldOutErrors without = predicted({{shared}}), block = predicted({{shared}, {of_one_block}}),
+                      group = predicted({{shared}, {of_one_group}}),
+                      both = predicted({{of_one_block}, {shared}, {of_one_group}});
+  for (std::size_t r = 0; r < split.test.size(); ++r) {
+    const int row = split.test[r];
+    const auto place = static_cast<Index>(r);
+    EXPECT_EQ(std::isnan(block.error(place, 0)), in_block(row));
+    EXPECT_EQ(std::isnan(group.error(place, 0)), in_group(row));
+    EXPECT_EQ(std::isnan(both.error(place, 0)), in_block(row) || in_group(row));
+    const auto is_as_without = [&](double error) { return std::abs(error - without.error(place, 0)) < 1e-9; };
+    EXPECT_TRUE(in_block(row) || is_as_without(block.error(place, 0)));
+    EXPECT_TRUE(in_group(row) || is_as_without(group.error(place, 0)));
+  }
+  EXPECT_LT(block.count(), without.count());
+  EXPECT_LT(group.count(), without.count());
+
+  // A shift of one block, taken out of y as the fit has it: that block does not speak for it.
+  const Components all_of_it = {of_one_block};
+  const CrossValidation before = cross_validate(o, {o.y + 3 * of_one_block}, {}, null, o.all_rows()),
+                        after = cross_validate(o, {o.y}, {all_of_it}, null, o.all_rows());
+  const VectorXd lower = before.losses() - after.losses();
+  EXPECT_NEAR(compare(before, after).total, lower.sum() - lower(4), 1e-9 * lower.sum());
+  EXPECT_GT(lower(4), 0.1 * lower.sum());
 }
 
 INSTANTIATE_TEST_SUITE_P(Rotors, HeldOut, testing::Values(1, 4));
