@@ -196,15 +196,15 @@ struct CandidateScan::Impl {
 
   /// One data set with so much of a candidate's column added to it.
   Data planted(const Data& data, Index set, std::size_t candidate, double amplitude) const {
-    const Index column = columns.first(candidate);
     Data result(data.size());
     for (std::size_t s = 0; s < data.size(); ++s)
       for (std::size_t ratio = 0; ratio < data[s].size(); ++ratio) {
-        const double own =
-            columns.touches(candidate, s) ? columns.products(s, ratio).candidate[candidate](0, 0) : 0;
-        const double with = data[s][ratio].columns(column, set);
         const ScanProducts::DataProducts& y = data[s][ratio];
         result[s].push_back({y.squares.segment(set, 1), y.least.segment(set, 1), y.columns.col(set)});
+        if (!columns.touches(candidate, s)) continue;
+        const Index column = columns.kept(candidate, s);
+        const double own = columns.products(s, ratio).candidate[candidate](0, 0),
+                     with = y.columns(column, set);
         result[s][ratio].squares(0) += amplitude * (2 * with + amplitude * own);
         result[s][ratio].columns(column, 0) += amplitude * own;
       }
@@ -268,6 +268,10 @@ NullFit CandidateScan::null_fit(const Components& y) const {
     for (double& p : probability) p /= sum;
     result.ratio_probability.push_back(std::move(probability));
   }
+  // Thrusts that are a quarter of the total each leave nothing between rotors: no number is divided by.
+  constexpr double kRounding = 1e-9, kNone = 1e-150;
+  const double largest = *std::max_element(result.sigma.begin(), result.sigma.end());
+  for (double& sigma : result.sigma) sigma = std::max({sigma, kRounding * largest, kNone});
   return result;
 }
 

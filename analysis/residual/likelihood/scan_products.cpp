@@ -2,6 +2,8 @@
 
 #include "analysis/residual/likelihood/in_two_threads.h"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace tunnelrig {
@@ -21,6 +23,7 @@ ScanProducts::ScanProducts(const MixedModel& model, const std::vector<Components
   const std::size_t strata = model.strata().size();
   for (std::size_t s = 0; s < strata; ++s) {
     project(s, items);
+    place(s, candidates);
     sessions_.emplace_back(model, s);
     by_session_.push_back(sessions_[s].coordinates(projected_[s]));
   }
@@ -53,6 +56,7 @@ void ScanProducts::take_out_adopted() {
     products.adopted_candidate.resize(0, all_ - q);
   }
   for (Index& first : first_) first -= q;
+  for (Index& kept : kept_[0]) kept -= q;
   adopted_ = 0;
 }
 
@@ -92,6 +96,24 @@ void ScanProducts::project(std::size_t stratum, const std::vector<const Componen
   used_.push_back(std::move(used));
 }
 
+void ScanProducts::place(std::size_t stratum, const std::vector<Candidate>& candidates) {
+  const std::vector<Index>& used = used_[stratum];
+  const bool all = model_.strata().size() == 1;  // where the adopted are taken out, of all
+  std::vector<Index>& kept = kept_.emplace_back();
+  std::vector<Index>& rows = rows_.emplace_back();
+  auto next = std::ranges::lower_bound(used, adopted_);
+  rows.assign(used.begin(), next);
+  Index size = adopted_;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Index own = std::ssize(candidates[i].columns), first = first_[i];
+    const bool keep = all || (next != used.end() && *next < first + own);
+    kept.push_back(keep ? size : -1);
+    for (; next != used.end() && *next < first + own; ++next) rows.push_back(size + *next - first);
+    if (keep) size += own;
+  }
+  how_many_kept_.push_back(size);
+}
+
 std::vector<ScanProducts::Products> ScanProducts::multiply(std::size_t stratum,
                                                            const std::vector<Candidate>& candidates) const {
   const auto among_all = [&](const Stacked& of_used) {
@@ -123,7 +145,7 @@ ScanProducts::Data ScanProducts::times(const std::vector<Stacked>& data) const {
     for (DataProducts& products : result[s]) {
       products.squares.resize(data[s].cols());
       products.least.resize(data[s].cols());
-      products.columns = MatrixXd::Zero(all_, data[s].cols());
+      products.columns = MatrixXd::Zero(how_many_kept_[s], data[s].cols());
     }
   in_two_threads(2 * data.size(), [&](std::size_t k) {  // half of a stratum's data sets
     const Stacked& sets = data[k / 2];
@@ -150,7 +172,7 @@ void ScanProducts::multiply(std::size_t stratum, Stacked sets, Index from,
     auto own = result[ratio].squares.segment(from, sets.cols());
     own = squares - weighted.cwiseProduct(in_sessions).colwise().sum().transpose();
     result[ratio].least.segment(from, sets.cols()) = kRounding * own;
-    result[ratio].columns(used_[stratum], Eigen::seqN(from, sets.cols())) =
+    result[ratio].columns(rows_[stratum], Eigen::seqN(from, sets.cols())) =
         columns - by_session_[stratum].transpose() * weighted;
   }
 }

@@ -25,7 +25,7 @@ class ScanProducts {
   struct DataProducts {
     Eigen::VectorXd squares;  // of each data set
     Eigen::VectorXd least;    // of them that rounding may leave of a perfect fit
-    Eigen::MatrixXd columns;  // (q + K) × data sets
+    Eigen::MatrixXd columns;  // kept × data sets: the adopted, and of candidates see `kept`
   };
   using Data = std::vector<std::vector<DataProducts>>;  // stratum, ratio
 
@@ -41,6 +41,9 @@ class ScanProducts {
   Eigen::Index taken_out() const { return taken_out_; }
   const Products& products(std::size_t stratum, std::size_t ratio) const { return products_[stratum][ratio]; }
   Eigen::Index first(std::size_t candidate) const { return first_[candidate]; }  // of its columns
+  /// The first of its columns among DataProducts::columns of a stratum; −1 where they are all 0 there, as
+  /// most are: few effects change a run's course.
+  Eigen::Index kept(std::size_t candidate, std::size_t stratum) const { return kept_[stratum][candidate]; }
 
   /// Whether a candidate, or any of the adopted columns, is other than 0 in a stratum.
   bool touches(std::size_t candidate, std::size_t stratum) const { return touches_[stratum][candidate]; }
@@ -50,6 +53,7 @@ class ScanProducts {
 
  private:
   void project(std::size_t stratum, const std::vector<const Components*>& items);
+  void place(std::size_t stratum, const std::vector<Candidate>& candidates);
   std::vector<Products> multiply(std::size_t stratum, const std::vector<Candidate>& candidates) const;
   void multiply(std::size_t stratum, Stacked sets, Eigen::Index from,
                 std::vector<DataProducts>& result) const;
@@ -63,8 +67,10 @@ class ScanProducts {
   std::vector<Eigen::LDLT<Eigen::MatrixXd>> normal_of_adopted_;
   std::vector<Eigen::MatrixXd> on_adopted_;
   std::vector<Eigen::Index> first_;
-  /// Of each stratum those that are not 0 there: few effects change a run's course.
-  std::vector<std::vector<Eigen::Index>> used_;
+  std::vector<std::vector<Eigen::Index>> used_;  // of each stratum those that are not 0 there
+  std::vector<std::vector<Eigen::Index>> kept_;  // stratum, candidate
+  std::vector<std::vector<Eigen::Index>> rows_;  // of each stratum's used among those that are kept
+  std::vector<Eigen::Index> how_many_kept_;
   std::vector<Stacked> projected_;  // at ratio 0
   std::vector<SessionDirections> sessions_;
   std::vector<Stacked> by_session_;              // the projected columns' coordinates in them

@@ -39,7 +39,6 @@ void StrataFit::solve(const Data& data, Index set, int candidate, State& state) 
 }
 
 void StrataFit::solve_alone(const Data& data, Index set, std::size_t candidate, State& state) const {
-  const Index column = columns_.first(candidate);
   for (int pass = 0; pass < 2; ++pass) {
     double a = 1e-300, b = 0;
     for (std::size_t s = 0; s < model_.strata().size(); ++s) {
@@ -47,7 +46,7 @@ void StrataFit::solve_alone(const Data& data, Index set, std::size_t candidate, 
       const std::size_t ratio = state.ratio[s];
       const double weight = this->weight(s, state);
       a += weight * columns_.products(s, ratio).candidate[candidate](0, 0);
-      b += weight * data[s][ratio].columns(column, set);
+      b += weight * data[s][ratio].columns(columns_.kept(candidate, s), set);
     }
     const double amplitude = b / a;
     state.amplitude = SmallVector::Constant(1, amplitude);
@@ -55,7 +54,8 @@ void StrataFit::solve_alone(const Data& data, Index set, std::size_t candidate, 
       if (!columns_.touches(candidate, s)) continue;
       const std::size_t ratio = state.ratio[s];
       const double own = columns_.products(s, ratio).candidate[candidate](0, 0);
-      const double squares = data[s][ratio].squares(set), with = data[s][ratio].columns(column, set);
+      const double squares = data[s][ratio].squares(set),
+                   with = data[s][ratio].columns(columns_.kept(candidate, s), set);
       state.rss[s] = std::max(squares - amplitude * (2 * with - amplitude * own), data[s][ratio].least(set));
     }
   }
@@ -84,23 +84,27 @@ void StrataFit::accumulate(const Data& data, Index set, int candidate, std::size
   const double weight = this->weight(s, state);
   a.topLeftCorner(adopted_, adopted_) += weight * p.adopted_adopted;
   b.head(adopted_) += weight * y.head(adopted_);
-  if (candidate < 0) return;
   const auto i = static_cast<std::size_t>(candidate);
+  if (candidate < 0 || columns_.kept(i, s) < 0) return;
   const Index own = a.rows() - adopted_;
   a.bottomLeftCorner(own, adopted_) +=
       weight * p.adopted_candidate.middleCols(columns_.first(i), own).transpose();
   a.bottomRightCorner(own, own) += weight * p.candidate[i];
-  b.tail(own) += weight * y.segment(columns_.first(i), own);
+  b.tail(own) += weight * y.segment(columns_.kept(i, s), own);
 }
 
 Eigen::VectorXd StrataFit::scores(const Data& data, Index set, const State& held) const {
-  const Index columns = data[0][0].columns.rows() - adopted_;
+  const Index columns = widths_.empty() ? 0 : columns_.first(widths_.size() - 1) + widths_.back() - adopted_;
   SmallMatrix normal = SmallMatrix::Zero(adopted_, adopted_);
   SmallVector of_adopted = SmallVector::Zero(adopted_);
   Eigen::MatrixXd beside = Eigen::MatrixXd::Zero(adopted_, columns), on_adopted = beside;
   Eigen::VectorXd with_data = Eigen::VectorXd::Zero(columns);
   for (std::size_t s = 0; s < held.ratio.size(); ++s) {
-    with_data += weight(s, held) * data[s][held.ratio[s]].columns.col(set).tail(columns);
+    const auto y = data[s][held.ratio[s]].columns.col(set);
+    for (std::size_t i = 0; i < widths_.size(); ++i)
+      if (const Index kept = columns_.kept(i, s); kept >= 0)
+        with_data.segment(columns_.first(i) - adopted_, widths_[i]) +=
+            weight(s, held) * y.segment(kept, widths_[i]);
     if (!columns_.adopted_touch(s)) continue;
     accumulate(data, set, -1, s, held, normal, of_adopted);
     beside += weight(s, held) * columns_.products(s, held.ratio[s]).adopted_candidate.rightCols(columns);
@@ -143,13 +147,12 @@ double StrataFit::residual(const Data& data, Index set, int candidate, std::size
   const auto of_adopted = state.amplitude.head(adopted_);
   SmallVector made = p.adopted_adopted * of_adopted;
   double gained = 2 * of_adopted.dot(y.columns.col(set).head(adopted_)) - of_adopted.dot(made);
-  if (candidate >= 0) {
-    const auto i = static_cast<std::size_t>(candidate);
-    const Index own = state.amplitude.size() - adopted_, first = columns_.first(i);
+  if (const auto i = static_cast<std::size_t>(candidate); candidate >= 0 && columns_.kept(i, s) >= 0) {
+    const Index own = state.amplitude.size() - adopted_;
     const auto of_own = state.amplitude.tail(own);
-    made = p.adopted_candidate.middleCols(first, own).transpose() * of_adopted;
-    gained +=
-        2 * of_own.dot(y.columns.col(set).segment(first, own) - made) - of_own.dot(p.candidate[i] * of_own);
+    made = p.adopted_candidate.middleCols(columns_.first(i), own).transpose() * of_adopted;
+    gained += 2 * of_own.dot(y.columns.col(set).segment(columns_.kept(i, s), own) - made) -
+              of_own.dot(p.candidate[i] * of_own);
   }
   return std::max(y.squares(set) - gained, y.least(set));
 }
