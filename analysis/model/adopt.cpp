@@ -1,6 +1,7 @@
 #include "analysis/model/adopt.h"
 
 #include "analysis/residual/explanation/explanation_output.h"
+#include "analysis/residual/likelihood/cross_validation.h"
 #include "datasets/error.h"
 
 #include <algorithm>
@@ -56,17 +57,24 @@ double jackknife_dof(const Observations& observations) {
   return std::max(1, std::min(observations.blocks(), static_cast<int>(kMostFolds)) - 1);
 }
 
-/// Whether the joint fit has a column for a parameter.
-bool has_column(const ModelTerm& term, std::size_t k) {
-  return term.effect->parameters[k].role != ParameterRole::kChangePoint && !(k == 0 && term.at_theory);
-}
+/// The explanation's model fitted jointly: amplitudes of its curves, covariance of all its columns, and whose
+/// columns they are.
+struct Joint {
+  AmplitudeFit fit;
+  std::vector<ParameterPlace> of_parameters;
 
-/// The joint fit at the explanation's model: amplitudes of its curves, and covariance of all its columns.
-AmplitudeFit joint_fit_of(const Observations& observations, const Explanation& explanation) {
+  /// Of a parameter; −1: it is no column of the fit, being known, a change-point, or a shape at its bound.
+  Index column(const ParameterPlace& place) const {
+    const auto found = std::find(of_parameters.begin(), of_parameters.end(), place);
+    return found == of_parameters.end() ? -1 : std::distance(of_parameters.begin(), found);
+  }
+};
+
+Joint joint_fit_of(const Observations& observations, const Explanation& explanation) {
   const std::vector<int> rows = observations.all_rows();
   const JointFit fit = fit_jointly(observations, explanation.model, rows);
   const Components y = difference(response_components(observations), fit.linear.offset);
-  return fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows);
+  return {fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows), fit.linear.of_parameters};
 }
 
 /// Where a parameter of the model stands among the joint fit's columns (−1: nowhere), and how far it is
@@ -81,9 +89,10 @@ struct Placed {
 /// How two go together: those of one effect (an amplitude and its time constant lie on a ridge that is no
 /// ellipse) as the jackknife's folds do, others as their columns do.
 double covariance_of_two(const Placed& one, const Placed& two, const MatrixXd& columns) {
-  if (one.column < 0 || two.column < 0) return 0;
+  if (one.uncertainty == 0 || two.uncertainty == 0) return 0;
   if (one.term == two.term && !one.deviations.empty() && one.deviations.size() == two.deviations.size())
     return std::inner_product(one.deviations.begin(), one.deviations.end(), two.deviations.begin(), 0.0);
+  if (one.column < 0 || two.column < 0) return 0;
   const double correlation = columns(one.column, two.column) /
                              std::sqrt(columns(one.column, one.column) * columns(two.column, two.column));
   if (!std::isfinite(correlation)) return 0;
@@ -137,20 +146,22 @@ Adoption adopt(const Observations& observations, const Explanation& explanation,
       result.notes.emplace_back("what was found has no name; --adopt-empirical adopts it as a curve");
     return result;
   }
-  const AmplitudeFit fit = joint_fit_of(observations, explanation);
+  const Joint joint = joint_fit_of(observations, explanation);
+  const AmplitudeFit& fit = joint.fit;
   std::vector<Placed> placed;
-  Index column = 0;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     model.terms.push_back(model_term(adopted, observations));
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k) {
-      const bool has = has_column(model.terms.back(), k);
-      placed.push_back({has ? column++ : -1, has ? adopted.parameters[k].standard_error : 0,
-                        model.terms.size(), adopted.parameters[k].deviations});
+      const Index column = joint.column({model.terms.size() - 1, k});
+      const bool uncertain = column >= 0 || adopted.term.effect->parameters[k].role == ParameterRole::kShape;
+      placed.push_back({column, uncertain ? adopted.parameters[k].standard_error : 0, model.terms.size(),
+                        adopted.parameters[k].deviations});
     }
     if (!adopted.confounded_with.empty())
       result.notes.push_back(fmt::format("{} is adopted, and these data cannot tell it from {}",
                                          adopted.term.label(), fmt::join(adopted.confounded_with, ", ")));
   }
+  Index column = std::ssize(joint.of_parameters);
   for (const Curve& curve : explanation.model.curves) {
     const auto bends = static_cast<Index>(curve.columns.size());
     if (curves_wanted && acts_on_means(curve)) {

@@ -5,6 +5,7 @@
 #include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/search/null_maxima.h"
 #include "analysis/upper_median.h"
+#include "calibration/distributions.h"
 
 #include <algorithm>
 #include <cmath>
@@ -293,8 +294,8 @@ class Page {
   }
 
   static double half_width(const VectorXd& values) {
-    const double n = static_cast<double>(values.size());
-    return 1.96 * std::sqrt((values.array() - values.mean()).square().sum() / std::max(1.0, n - 1) / n);
+    const double n = static_cast<double>(values.size()), dof = std::max(1.0, n - 1);
+    return half_width_95(std::sqrt((values.array() - values.mean()).square().sum() / dof / n), dof);
   }
 
   const Explanation& explanation_;

@@ -1,5 +1,6 @@
 // Structure without a name, as a curve with its band.
 #include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/likelihood/cross_validation.h"
 #include "calibration/distributions.h"
 
 #include <algorithm>
@@ -139,27 +140,45 @@ MatrixXd beside_baseline(const Observations& observations, const std::vector<int
   return columns;
 }
 
-/// What of a curve the baseline or the rest of the model can do as well may be of any size in the fit, and be
-/// taken back by them. Of the curves that fit about as well the smallest is meant: its values have a normal
-/// prior of twice the size of what it alone can do. Changes amplitude and covariance.
-void keep_to_its_own_size(const Observations& observations, const std::vector<int>& rows,
-                          const std::vector<Components>& others, const Curve& curve, VectorXd& amplitude,
-                          MatrixXd& covariance) {
-  constexpr double kWider = 2;
-  MatrixXd whole = stacked(curve.columns, rows, observations.channels());
-  MatrixXd own = beside_baseline(observations, rows, whole);
-  if (!others.empty()) {
-    const MatrixXd rest = beside_baseline(observations, rows, stacked(others, rows, observations.channels()));
+/// With a normal prior of mean 0 on the last of the amplitudes.
+AmplitudeFit with_prior(const AmplitudeFit& fit, const MatrixXd& precision) {
+  MatrixXd information = fit.information;
+  information.bottomRightCorner(precision.rows(), precision.cols()) += precision;
+  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(information);
+  return {solver.solve(fit.information * fit.amplitude), solver.pseudoInverse(), information};
+}
+
+/// Where the columns of one curve stand among those of all.
+struct Span {
+  Index first, width;
+};
+
+/// What of a curve the baseline, an effect or another curve can do as well may be of any size in the fit, and
+/// be taken back by them. Of the curves that fit about as well the smallest and smoothest are meant: the
+/// columns of each, which bend the more the later they come, have a normal prior of twice the size of what
+/// all curves together do beside baseline and effects, less for those that bend. `effects`: columns before
+/// the curves'.
+AmplitudeFit kept_to_their_size(const Observations& observations, const std::vector<int>& rows,
+                                const std::vector<Components>& columns, std::size_t effects,
+                                const std::vector<Span>& spans, const AmplitudeFit& fit) {
+  constexpr double kWider2 = 4;
+  const MatrixXd all = stacked(columns, rows, observations.channels());
+  const auto count = static_cast<Index>(effects);
+  MatrixXd whole = all.rightCols(all.cols() - count), own = beside_baseline(observations, rows, whole);
+  if (effects > 0) {
+    const MatrixXd rest = beside_baseline(observations, rows, all.leftCols(count));
     own -= rest * rest.completeOrthogonalDecomposition().solve(own);
   }
   whole.rowwise() -= whole.colwise().mean().eval();
-  const double own_square = (own * amplitude).squaredNorm();
-  if (!(own_square > 0)) return;
-  const auto k = static_cast<Index>(curve.columns.size());
-  const MatrixXd precision = whole.transpose() * whole / (kWider * kWider * own_square);
-  const Eigen::PartialPivLU<MatrixXd> shrink(MatrixXd::Identity(k, k) + covariance * precision);
-  amplitude = shrink.solve(amplitude).eval();
-  covariance = shrink.solve(covariance).eval();
+  const double together = (own * fit.amplitude.tail(own.cols())).squaredNorm();
+  if (!(together > 0)) return fit;
+  MatrixXd precision = MatrixXd::Zero(own.cols(), own.cols());
+  for (const auto& [first, width] : spans) {
+    const VectorXd bends = VectorXd::LinSpaced(width, 1, static_cast<double>(width));
+    const MatrixXd x = whole.middleCols(first, width) * bends.asDiagonal();
+    precision.block(first, first, width, width) = x.transpose() * x / (kWider2 * together);
+  }
+  return with_prior(fit, precision);
 }
 
 std::vector<double> values_seen(const Curve& curve, const std::vector<int>& rows) {
@@ -217,30 +236,37 @@ std::string column_behind(const std::string& derived) {
   return derived;
 }
 
-/// A found curve as it is drawn, in the place of its own columns in the fit.
+/// A found curve as it is drawn.
 struct FittedCurve {
   Curve curve;
   VectorXd amplitude;
   MatrixXd covariance;
 };
 
+/// In one fit of all curves as they are drawn: together they are what the model says.
 FittedCurve fit_as_drawn(const Observations& observations, const JointFit& fit, const Curve& found,
                          const std::vector<int>& rows) {
-  FittedCurve result{as_drawn(observations, found, rows), {}, {}};
-  std::vector<Components> others = fit.linear.columns;
-  auto last = others.end();
-  for (auto other = fit.model.curves.rbegin(); !other->is_like(found); ++other)
-    last -= static_cast<std::ptrdiff_t>(other->columns.size());
-  others.erase(last - static_cast<std::ptrdiff_t>(found.columns.size()), last);
-  std::vector<Components> columns = others;
-  columns.insert(columns.end(), result.curve.columns.begin(), result.curve.columns.end());
+  FittedCurve result;
+  const std::size_t effects = fit.linear.of_parameters.size();
+  std::vector<Components> columns(fit.linear.columns.begin(),
+                                  fit.linear.columns.begin() + static_cast<std::ptrdiff_t>(effects));
+  std::vector<Span> spans;
+  Index first = 0;
+  for (const Curve& each : fit.model.curves) {
+    const Curve drawn = as_drawn(observations, each, rows);
+    if (each.is_like(found)) {
+      result.curve = drawn;
+      first = std::ssize(columns);
+    }
+    spans.push_back({std::ssize(columns) - static_cast<Index>(effects), std::ssize(drawn.columns)});
+    columns.insert(columns.end(), drawn.columns.begin(), drawn.columns.end());
+  }
   const Components y = difference(response_components(observations), fit.linear.offset);
-  const AmplitudeFit amplitudes = fit_amplitudes(observations, y, columns, fit.variances, rows);
+  AmplitudeFit all = fit_amplitudes(observations, y, columns, fit.variances, rows);
+  if (found.x.size() > 0) all = kept_to_their_size(observations, rows, columns, effects, spans, all);
   const auto k = static_cast<Index>(result.curve.columns.size());
-  result.amplitude = amplitudes.amplitude.tail(k);
-  result.covariance = amplitudes.covariance.bottomRightCorner(k, k);
-  if (found.x.size() > 0)
-    keep_to_its_own_size(observations, rows, others, result.curve, result.amplitude, result.covariance);
+  result.amplitude = all.amplitude.segment(first, k);
+  result.covariance = all.covariance.block(first, first, k, k);
   return result;
 }
 
@@ -263,14 +289,14 @@ std::vector<std::vector<Drawn>> pieces_to_draw(const Observations& observations,
   return pieces;
 }
 
-/// The points with their band, and the amplitude, which is the largest piece's.
-void draw(const std::vector<Drawn>& points, const FittedCurve& fitted, double scale,
+/// The points with their band, `t` standard errors, and the amplitude, which is the largest piece's.
+void draw(const std::vector<Drawn>& points, const FittedCurve& fitted, double scale, double t,
           UnknownStructure& result) {
   double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
   for (const Drawn& point : points) {
     const double value = scale * point.columns.dot(fitted.amplitude);
     const double half =
-        1.96 * scale * std::sqrt(std::max(0.0, point.columns.dot(fitted.covariance * point.columns)));
+        t * scale * std::sqrt(std::max(0.0, point.columns.dot(fitted.covariance * point.columns)));
     result.shape.push_back({point.x, value, value - half, value + half});
     lowest = std::min(lowest, value);
     highest = std::max(highest, value);
@@ -300,9 +326,12 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
     result.collinear_with = collinear_with(observations, *covariate);
   }
   const FittedCurve fitted = fit_as_drawn(observations, fit, found.curve, rows);
+  // As of parameters: the curve is known no better than by how many blocks there are.
+  const double others = static_cast<double>(leave_out_blocks(observations, rows).size()) - 1;
+  const double t = student_t_quantile(0.975, std::max(1.0, others));
   for (std::vector<Drawn>& points : pieces_to_draw(observations, fitted.curve, rows)) {
     if (!fitted.curve.strength) centre(points);
-    draw(points, fitted, observations.response_per_y(), result);
+    draw(points, fitted, observations.response_per_y(), t, result);
   }
   return result;
 }

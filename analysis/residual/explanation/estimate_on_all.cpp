@@ -84,6 +84,10 @@ void estimate_on_all(const Models& models, const Observations& observations,
     explanation.warnings.emplace_back(
         "the effects could not be fitted together to all runs, since forces would change their sign: the "
         "parameters are those that the search had");
+  else if (!whole.settled)
+    explanation.warnings.emplace_back(
+        "the effects are so large that their parameters and the forces that they act on have not settled in "
+        "turns: a parameter may be off by more than a thousandth of itself");
   explanation.model = whole.model;
   explanation.scatter = wide.scatter;
   explanation.residual_before = residuals(baseline.data, fit_jointly(baseline.data, {}, rows), rows);

@@ -1,5 +1,6 @@
 // Intervals of errors and of parameters.
 #include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/likelihood/cross_validation.h"
 #include "calibration/distributions.h"
 
 #include <algorithm>
@@ -94,10 +95,12 @@ void set_interval(const Observations& observations, const HeldOutErrors& sealed,
 
 namespace {
 
-/// Every parameter with all rows, and with each fold's blocks left out: by term, then parameter.
+/// Every parameter with all rows, and with each fold's blocks left out: by term, then parameter. Folds to
+/// whose runs the model cannot be fitted say nothing.
 struct Jackknife {
   MeanModel centre;
   std::vector<std::vector<std::vector<double>>> values;  // by fold, last
+  std::size_t folds = 0;
 
   /// Their sum of squares is the parameter's variance.
   std::vector<double> deviations(std::size_t term, std::size_t parameter) const {
@@ -111,13 +114,15 @@ struct Jackknife {
 
 Jackknife jackknife(const Observations& observations, const MeanModel& model, const NullFit& variances,
                     const std::vector<int>& rows, const std::vector<Fold>& folds) {
-  Jackknife result{refit(observations, model, variances, rows), {}};
+  Jackknife result{refit(observations, model, variances, rows).value_or(model), {}};
   for (const Term& term : model.terms) result.values.emplace_back(term.parameters.size());
   for (const Fold& fold : folds) {
-    const MeanModel without = refit(observations, result.centre, variances, fold.kept);
-    for (std::size_t t = 0; t < without.terms.size(); ++t)
-      for (std::size_t k = 0; k < without.terms[t].parameters.size(); ++k)
-        result.values[t][k].push_back(without.terms[t].parameters[k]);
+    const auto without = refit(observations, result.centre, variances, fold.kept);
+    if (!without) continue;
+    ++result.folds;
+    for (std::size_t t = 0; t < without->terms.size(); ++t)
+      for (std::size_t k = 0; k < without->terms[t].parameters.size(); ++k)
+        result.values[t][k].push_back(without->terms[t].parameters[k]);
   }
   return result;
 }
@@ -128,7 +133,6 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
                                                                 const JointFit& fit,
                                                                 const std::vector<int>& rows) {
   const std::vector<Fold> folds = leave_out_blocks(observations, rows);
-  const double dof = static_cast<double>(folds.size()) - 1;
   const Jackknife found = jackknife(observations, fit.model, fit.variances, rows, folds);
   std::vector<std::vector<ParameterEstimate>> result(fit.model.terms.size());
   for (std::size_t t = 0; t < result.size(); ++t) {
@@ -145,12 +149,14 @@ std::vector<std::vector<ParameterEstimate>> estimate_parameters(const Observatio
       const bool theory = k == 0 && term.at_theory;
       const Jackknife& says = theory && freed ? *freed : found;
       std::vector<double> deviations = says.deviations(t, k);
+      const bool known = says.folds > 1;
       const double error =
-          std::sqrt(std::inner_product(deviations.begin(), deviations.end(), deviations.begin(), 0.0));
-      const double half = half_width_95(error, dof);
+          known ? std::sqrt(std::inner_product(deviations.begin(), deviations.end(), deviations.begin(), 0.0))
+                : parameter.upper - parameter.lower;
+      const double half = known ? half_width_95(error, static_cast<double>(says.folds) - 1) : error;
       const double middle = says.centre.terms[t].parameters[k];
       // No time is below zero. What an amplitude's interval says of its sign stays said.
-      const bool bounded = parameter.role == ParameterRole::kShape;
+      const bool bounded = !known || parameter.role == ParameterRole::kShape;
       result[t].push_back({.name = parameter.name,
                            .unit = parameter.unit,
                            .value = found.centre.terms[t].parameters[k],

@@ -62,6 +62,7 @@ JointFit without_curves(JointFit fit, const Observations& observations, const st
   fit.model.curves.clear();
   fit.linear = linearise(observations, fit.model, predict_forces(observations, fit.model, rows));
   fit.linear.columns.clear();
+  fit.linear.of_parameters.clear();
   fit.variances = CandidateScan(MixedModel(observations, rows), {}, {})
                       .null_fit(difference(response_components(observations), fit.linear.offset));
   return fit;

@@ -265,7 +265,7 @@ AmplitudeFit fit_amplitudes(const Observations& observations, const Components& 
                             const std::vector<int>& rows) {
   const std::vector<const Components*> items = pointers_to(columns);
   const Fit fit = fit_amplitudes(MixedModel(observations, rows, null.ratio), y, items, null);
-  return {fit.amplitude, fit.covariance};
+  return {fit.amplitude, fit.covariance, fit.equations.a};
 }
 
 HeldOutErrors predict_held_out(const Observations& observations, const Components& y,

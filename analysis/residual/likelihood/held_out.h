@@ -26,6 +26,7 @@ struct HeldOutErrors {
 struct AmplitudeFit {
   Eigen::VectorXd amplitude;
   Eigen::MatrixXd covariance;
+  Eigen::MatrixXd information = {};  // whose inverse that is, where it has one
 };
 AmplitudeFit fit_amplitudes(const Observations& observations, const Components& y,
                             const std::vector<Components>& columns, const NullFit& null,

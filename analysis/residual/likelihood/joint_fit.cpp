@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include <ceres/ceres.h>
 
@@ -14,19 +15,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Where a parameter of the model stands.
-struct FreeParameter {
-  std::size_t term = 0, parameter = 0;
-};
-
 bool is_free(const Term& term, std::size_t k) {
   const EffectParameter& parameter = term.effect->parameters[k];
   if (parameter.role == ParameterRole::kChangePoint || term.per_group) return false;
   return !(k == 0 && term.at_theory);
 }
 
-std::vector<FreeParameter> free_parameters(const MeanModel& model) {
-  std::vector<FreeParameter> result;
+std::vector<ParameterPlace> free_parameters(const MeanModel& model) {
+  std::vector<ParameterPlace> result;
   for (std::size_t t = 0; t < model.terms.size(); ++t)
     for (std::size_t k = 0; k < model.terms[t].parameters.size(); ++k)
       if (is_free(model.terms[t], k)) result.push_back({t, k});
@@ -121,7 +117,7 @@ class Residuals : public ceres::CostFunction {
 
   const Observations& observations_;
   MeanModel model_;
-  std::vector<FreeParameter> free_;
+  std::vector<ParameterPlace> free_;
   const Whitener& whitener_;
   const Forces& forces_;
   VectorXd y_;
@@ -132,10 +128,10 @@ class Residuals : public ceres::CostFunction {
 
 bool solve(const Observations& observations, MeanModel& model, const Whitener& whitener,
            const Forces& forces) {
-  const std::vector<FreeParameter> free = free_parameters(model);
+  const std::vector<ParameterPlace> free = free_parameters(model);
   if (free.empty()) return true;
   std::vector<double> values;
-  for (const FreeParameter& f : free) values.push_back(model.terms[f.term].parameters[f.parameter]);
+  for (const ParameterPlace& f : free) values.push_back(model.terms[f.term].parameters[f.parameter]);
   for (std::size_t i = 0; i < free.size(); ++i) {
     const EffectParameter& parameter = model.terms[free[i].term].effect->parameters[free[i].parameter];
     values[i] = std::clamp(values[i], parameter.lower, parameter.upper);
@@ -169,8 +165,8 @@ constexpr int kMostRounds = 8;  // of forces and parameters in turns
 /// Whether a round has left the parameters where they were, as far as anybody reads them.
 bool has_settled(const MeanModel& before, const MeanModel& after) {
   constexpr double kLittle = 1e-3;
-  const std::vector<FreeParameter> free = free_parameters(after);
-  return std::all_of(free.begin(), free.end(), [&](const FreeParameter& f) {
+  const std::vector<ParameterPlace> free = free_parameters(after);
+  return std::all_of(free.begin(), free.end(), [&](const ParameterPlace& f) {
     const EffectParameter& parameter = after.terms[f.term].effect->parameters[f.parameter];
     const double value = after.terms[f.term].parameters[f.parameter];
     const double size = std::max(std::abs(value), kLittle * (parameter.upper - parameter.lower));
@@ -322,22 +318,24 @@ LinearModel linearise(const Observations& observations, const MeanModel& model, 
     TermResponse response = respond(term, observations, forces.acted_on[t]);
     for (std::size_t k = 0; k < linear.offset.size(); ++k) linear.offset[k] += response.value[k];
     for (std::size_t k = 0; k < response.derivative.size(); ++k)
-      if (is_free(term, k) && (k == 0 || shapes == Shapes::kAll || !is_at_bound(term, k)))
+      if (is_free(term, k) && (k == 0 || shapes == Shapes::kAll || !is_at_bound(term, k))) {
         linear.columns.push_back(std::move(response.derivative[k]));
+        linear.of_parameters.push_back({t, k});
+      }
   }
   for (const Curve& curve : model.curves)
     linear.columns.insert(linear.columns.end(), curve.columns.begin(), curve.columns.end());
   return linear;
 }
 
-MeanModel refit(const Observations& observations, const MeanModel& start, const NullFit& variances,
-                const std::vector<int>& rows) {
+std::optional<MeanModel> refit(const Observations& observations, const MeanModel& start,
+                               const NullFit& variances, const std::vector<int>& rows) {
   MeanModel model = start;
   const MixedModel mixed(observations, rows, variances.ratio);
   const Whitener whitener(mixed, variances, model.curves);
   for (int round = 0; round < kMostRounds; ++round) {
     const MeanModel before = model;
-    solve(observations, model, whitener, predict_forces(observations, model, rows));
+    if (!solve(observations, model, whitener, predict_forces(observations, model, rows))) return {};
     if (has_settled(before, model)) break;
   }
   return model;
@@ -367,11 +365,12 @@ JointFit fit_jointly(const Observations& observations, const MeanModel& start, c
     const Whitener whitener(mixed, fit.variances, fit.model.curves);
     const MeanModel before = fit.model;
     fit.converged = solve(observations, fit.model, whitener, forces);
-    if (round > 0 && has_settled(before, fit.model)) break;
+    fit.settled = round > 0 && has_settled(before, fit.model);
+    if (fit.settled) break;
   }
   fit.linear = linearise(observations, fit.model, predict_forces(observations, fit.model, rows));
   fit.variances = CandidateScan(mixed, fit.linear.columns, {}).null_fit(difference(y, fit.linear.offset));
-  for (const FreeParameter& f : free_parameters(fit.model)) {
+  for (const ParameterPlace& f : free_parameters(fit.model)) {
     const Term& term = fit.model.terms[f.term];
     if (is_at_bound(term, f.parameter))
       fit.at_bound.push_back(term.label() + " " + term.effect->parameters[f.parameter].name);

@@ -4,6 +4,8 @@
 #include "analysis/residual/likelihood/curves.h"
 #include "analysis/residual/likelihood/held_out.h"
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,11 +19,18 @@ struct MeanModel {
   MeanModel without_term(std::size_t t) const;
 };
 
+/// Where a parameter of the model stands.
+struct ParameterPlace {
+  std::size_t term = 0, parameter = 0;
+  bool operator==(const ParameterPlace&) const = default;
+};
+
 /// A mean model at its parameters, ready for linear algebra: what the terms add, and columns for everything
 /// still free.
 struct LinearModel {
   Components offset;                // what the terms add to y
   std::vector<Components> columns;  // derivatives by the terms' free parameters, then the curves' columns
+  std::vector<ParameterPlace> of_parameters = {};  // whose the first columns are
 };
 
 /// Forces (responses), n × c each.
@@ -56,6 +65,7 @@ struct JointFit {
   NullFit variances;                  // with the model in
   std::vector<std::string> at_bound;  // "creep of rotor 2 time_constant"
   bool converged = true;
+  bool settled = true;  // whether the last round of forces and parameters left both as they were
 };
 
 /// Whether parameter k is where physics ends.
@@ -68,8 +78,9 @@ bool at_bound(const JointFit& fit, const Term& term);
 /// linear and are projected out. Parameters stay within their physical bounds.
 JointFit fit_jointly(const Observations& observations, const MeanModel& start, const std::vector<int>& rows);
 
-/// The same with known variances, from a start that is nearly there: for jackknives.
-MeanModel refit(const Observations& observations, const MeanModel& start, const NullFit& variances,
-                const std::vector<int>& rows);
+/// The same with known variances, from a start that is nearly there: for jackknives. Nothing where it cannot
+/// be fitted to these rows.
+std::optional<MeanModel> refit(const Observations& observations, const MeanModel& start,
+                               const NullFit& variances, const std::vector<int>& rows);
 
 }  // namespace tunnelrig

@@ -74,7 +74,7 @@ std::vector<MatrixXd> MixedModel::sizes_left(const std::vector<std::size_t>& rat
                                                  : std::abs(left(i)) / (own(i) - taken(i));
     }
     result[s] = Eigen::Map<const MatrixXd>(size.data(), n, strata_[s].modes);
-    result[s] *= std::sqrt(static_cast<double>(size.size())) / size.norm();
+    if (size.norm() > 0) result[s] *= std::sqrt(static_cast<double>(size.size())) / size.norm();
   }
   return result;
 }

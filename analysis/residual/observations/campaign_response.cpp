@@ -87,7 +87,7 @@ void set_response(const CampaignSource& source, const CampaignResponse& response
   result.y = result.value.cwiseQuotient(result.known);
 }
 
-void warn_of_constant_rotors(Observations& observations) {
+void warn_of_unmeasured_rotors(Observations& observations) {
   if (observations.channels() < 2) return;
   for (Index c = 0; c < observations.channels(); ++c)
     if (observations.value.col(c).maxCoeff() == observations.value.col(c).minCoeff())
@@ -95,6 +95,16 @@ void warn_of_constant_rotors(Observations& observations) {
           "the response {} of rotor {} is the same in every run, {:.4g} {}: it was not measured, and "
           "what is said of that rotor is worth nothing",
           observations.response, c + 1, observations.value(0, c), observations.unit));
+  constexpr double kRounding = 1e-9;
+  const Eigen::ArrayXXd share =
+      observations.value.array().colwise() / observations.value.rowwise().sum().array();
+  const Eigen::Array<double, 1, Eigen::Dynamic> spread =
+      share.colwise().maxCoeff() - share.colwise().minCoeff();
+  if (observations.rows() > 1 && (spread < kRounding).all())
+    observations.left_out.push_back(fmt::format(
+        "each rotor has the same share of the {} in every run: these are parts of a total, and of one rotor "
+        "by itself they say nothing",
+        observations.response));
 }
 
 void leave_out_against_sign(CampaignSource& source, const CampaignResponse& response, Observations& result) {

@@ -48,6 +48,6 @@ void leave_out_against_sign(CampaignSource& source, const CampaignResponse& resp
 void set_response(const CampaignSource& source, const CampaignResponse& response, Observations& result);
 
 /// Rotors of which nothing can be seen, though others differ.
-void warn_of_constant_rotors(Observations& observations);
+void warn_of_unmeasured_rotors(Observations& observations);
 
 }  // namespace tunnelrig

@@ -325,7 +325,7 @@ Observations observe_campaign(const CampaignData& data, const ObservationChoice&
   if (!(result.value.maxCoeff() > result.value.minCoeff()))
     throw InputError(fmt::format("the response {} is the same in every run: there is nothing to explain",
                                  result.response));
-  warn_of_constant_rotors(result);
+  warn_of_unmeasured_rotors(result);
   for (std::string& misread : in_words(misread_runs(data))) result.left_out.push_back(std::move(misread));
   return result;
 }

@@ -1,6 +1,7 @@
 #include "analysis/residual/observations/table_source.h"
 
 #include "analysis/resting_speed.h"
+#include "datasets/error.h"
 #include "datasets/first_few.h"
 
 #include <algorithm>
@@ -170,6 +171,9 @@ TableSource used_rows(const ObservationTable& table, const ObservationChoice& ch
   } else if (thrust_with_speed) {
     leave_out_few_without_speed(source, result);
   }
+  if (source.rows.empty())
+    throw InputError(fmt::format("{}: no row is left to explain: {}", table.schema.name,
+                                 fmt::join(result.left_out, "; ")));
   say_duplicates(source, result);
   return source;
 }

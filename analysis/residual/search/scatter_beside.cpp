@@ -144,6 +144,13 @@ std::vector<Curve> of_each_rotor(const CurveScan& curves) {
       ->second.curves;
 }
 
+/// Parts of a total do not.
+bool rotors_differ(const Components& residual, const std::vector<int>& rows) {
+  constexpr double kRounding = 1e-9;
+  const Eigen::MatrixXd means = residual[0](rows, Eigen::all);
+  return (means.colwise() - means.rowwise().mean()).norm() > kRounding * means.norm();
+}
+
 }  // namespace
 
 std::optional<RunScatter> other_scatter_beside(const SearchData& data, const Found& found,
@@ -173,14 +180,17 @@ std::optional<RunScatter> other_scatter_beside(const SearchData& data, const Fou
     with_each_rotor.insert(with_each_rotor.end(), curve.columns.begin(), curve.columns.end());
   const Components of_rotors = left_beside(with_each_rotor);
   // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter.
-  const Eigen::VectorXd contrasts = contrast_scatter(scattered, data.rows(), of_rotors, for_contrasts);
-  if (contrasts.size() == 0) scatter.rotors = rotor_scatter(scattered, data.rows(), of_rotors, for_rotors);
+  const bool differ = rotors_differ(of_rotors, data.rows());
+  const Eigen::VectorXd contrasts =
+      differ ? contrast_scatter(scattered, data.rows(), of_rotors, for_contrasts) : Eigen::VectorXd();
+  if (differ && contrasts.size() == 0)
+    scatter.rotors = rotor_scatter(scattered, data.rows(), of_rotors, for_rotors);
   const MixedModel model(scattered, data.rows());
   const NullFit variances = CandidateScan(model, columns, {}).null_fit(y);
   scatter.run_correlation = run_correlation(scattered, model, variances, residual, for_correlation);
   scatter.runs = run_scatter(data.observations(), run_sizes(model, variances, y, columns, for_runs));
   // The best of many curves makes half of what a dozen sessions differ by, whatever that is.
-  if (contrasts.size() == 0)
+  if (differ && contrasts.size() == 0)
     scatter.sessions =
         rotor_sessions(scattered, data.rows(), left_beside(found.fit.linear.columns), for_sessions);
   scatter.contrasts = contrasts;  // after what takes the differences for one stratum

@@ -130,6 +130,17 @@ TEST_F(CampaignMeaning, OneLocationHasOneCoefficientHoweverItIsWritten) {
   EXPECT_EQ(observe_campaign(data, {}).groups(), 3);
 }
 
+/// The scale under the whole vehicle, a quarter of it to each rotor.
+TEST_F(CampaignMeaning, PartsOfATotalAreNoThrustsOfRotors) {
+  add_sessions(Tares::kNone, 0.004);
+  for (auto& cell : data.certificate->cells) cell = data.certificate->cells[0];
+  const auto said = Contains(HasSubstr("each rotor has the same share of the thrust in every run"));
+  EXPECT_THAT(observe_campaign(data, {}).left_out, testing::Not(said));
+  for (auto& [run, statistics] : data.statistics)
+    for (auto& channel : statistics.channels) channel.mean_V = statistics.channels[0].mean_V;
+  EXPECT_THAT(observe_campaign(data, {}).left_out, said);
+}
+
 /// Hum at 50 Hz where the campaign says 60 is no line of the mains, and would be seen by nothing.
 TEST_F(CampaignMeaning, AHumOfTheOtherGridIsSaid) {
   add_sessions(Tares::kNone, 0);

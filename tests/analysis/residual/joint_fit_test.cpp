@@ -218,9 +218,9 @@ TEST_F(JointFitTest, RefitFollowsTheRuns) {
   test::add_effect(o, "creep", {0.04, 90});
   const auto rows = o.all_rows();
   const JointFit whole = fit_jointly(o, {{term("creep", {0.04, 90})}, {}}, rows);
-  const MeanModel again = refit(o, whole.model, whole.variances, rows);
+  const MeanModel again = refit(o, whole.model, whole.variances, rows).value();
   EXPECT_NEAR(again.terms[0].parameters[0], whole.model.terms[0].parameters[0], 1e-4);
-  const MeanModel half = refit(o, whole.model, whole.variances, {rows.begin(), rows.begin() + 56});
+  const MeanModel half = refit(o, whole.model, whole.variances, {rows.begin(), rows.begin() + 56}).value();
   EXPECT_NE(half.terms[0].parameters[0], again.terms[0].parameters[0]);
   EXPECT_NEAR(half.terms[0].parameters[0], 0.04, 0.01);
 }

@@ -58,6 +58,20 @@ TEST_F(Rotors, WhatAConditionDoesInPairsIsNoScatter) {
   }
 }
 
+/// One scale under all four: nothing is left between rotors, which must silence nothing else.
+TEST_F(Rotors, PartsOfATotalAreExplainedAsTheTotal) {
+  for (const double exponent : {0.0, 0.5}) {
+    Observations o = observations();
+    if (exponent > 0) test::add_effect(o, "supply_voltage", {exponent});
+    test::set_y(o, o.y.rowwise().mean().replicate(1, o.channels()));
+    const Explanation e = explained(o);
+    EXPECT_EQ(names(e), exponent > 0 ? "supply_voltage; " : "") << explanation_text(e);
+    EXPECT_TRUE(e.unknown.empty()) << explanation_text(e);
+    EXPECT_GT(e.detectable, 0);
+    EXPECT_GT(e.noise_floor, 0);
+  }
+}
+
 /// A wind that lifts the front rotors and presses the rear ones: beside curves of two, what is left of the
 /// others goes down in all, as a wind from the front would have it.
 TEST_F(Rotors, WhatTwoDoIsNoNameOfAll) {

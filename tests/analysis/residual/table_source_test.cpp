@@ -186,6 +186,24 @@ TEST_F(TableSourceTest, RowsWithoutAirHaveNoC_TAndItsPressureIsNotSoughtAgain) {
       << "what is the default is the same when it is said";
 }
 
+/// The air was noted once, where the motor stood.
+TEST_F(TableSourceTest, WhereNoRowIsLeftTheReasonsAreSaid) {
+  std::string csv = "b,N,T,y\n0,10,20,0.01\n";
+  for (int r = 0; r < 24; ++r) csv += fmt::format("{},5000,,{}\n", r / 4, 6 + 0.1 * even(random));
+  const std::string schema = std::string(kThrustAndSpeed) + kPropeller +
+                             "[[covariates]]\ncolumn = \"T\"\nunit = \"degC\"\nmeaning = "
+                             "\"air_temperature_C\"\n";
+  for (const std::string groups : {"", "groups = [\"b\"]\n"}) {
+    try {
+      observed(csv, groups + schema);
+      ADD_FAILURE() << "explained without a row";
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("no row is left to explain: 1 row left out: the motor stood"));
+      EXPECT_THAT(error.what(), HasSubstr("the temperature or the pressure of the air is empty"));
+    }
+  }
+}
+
 /// Of a cell for forces and moments: both load it.
 TEST_F(TableSourceTest, AForceLeaksIntoAMoment) {
   std::string csv = "series,fy,mx,y\n";
