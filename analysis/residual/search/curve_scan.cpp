@@ -2,10 +2,10 @@
 
 #include "analysis/residual/likelihood/testability.h"
 #include "analysis/residual/observations/condition_values.h"
+#include "analysis/residual/search/slopes_of_units.h"
 #include "analysis/residual/search/unseen.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace tunnelrig {
 namespace {
@@ -49,11 +49,10 @@ CurveScan scan_curves(const SearchData& data, const Found& found) {
     // What is straight over few values has a name then, and the bends ask for the rest.
     if (named && each.shape == CurveShape::kLevels) continue;
     Curve curve = named ? without_trend(each, data.rows()) : each;
-    Candidate candidate = as_candidate(curve);
-    if (!data.mixed().sees(candidate.columns[0])) continue;
-    result.scan.candidates.push_back(std::move(candidate));
-    result.tried.push_back(std::move(curve));
+    if (data.mixed().sees(curve.columns[0])) result.tried.push_back(std::move(curve));
   }
+  result.tried = with_slopes_that_follow(data, found.fit, std::move(result.tried));
+  for (const Curve& curve : result.tried) result.scan.candidates.push_back(as_candidate(curve));
   if (!result.tried.empty()) rank(data, found.fit, result.scan);
   return result;
 }

@@ -81,6 +81,39 @@ TEST_F(Products, OneConditionAloneIsNotTakenForTwo) {
   EXPECT_EQ(e.unknown[0].times, "");
 }
 
+/// Propellers each with a slope of its own: any number written beside them would have a product with it, as
+/// far as rows are counted.
+TEST_F(Products, SlopesOfTheGroupsOwnGoWithNothingThatIsWrittenBesideThem) {
+  constexpr int kGroups = 12, kTables = 10;
+  std::normal_distribution<double> normal;
+  const auto is_product_with_batch = [](const UnknownStructure& u) {
+    return u.times == "batch" || (u.covariate == "batch" && !u.times.empty());
+  };
+  int with_random = 0, with_true = 0;
+  for (int table = 0; table < kTables; ++table)
+    for (const bool follows : {false, true}) {
+      Observations o = test::simulate({.runs_of_block = std::vector<int>(16, 12), .groups = kGroups}, random);
+      test::add_covariate(o, "supply_voltage_V", 15.5, 16.5, random);
+      VectorXd batch(kGroups), slope(kGroups);
+      for (int g = 0; g < kGroups; ++g) {
+        batch(g) = normal(random);
+        slope(g) = 0.008 * (follows ? batch(g) + 0.3 * normal(random) : normal(random));
+      }
+      Covariate beside{"batch", VectorXd(o.rows())};
+      VectorXd added = from_mean(o, "supply_voltage_V");
+      for (Index row = 0; row < o.rows(); ++row) {
+        const int group = o.group[static_cast<std::size_t>(row)];
+        beside.value(row, 0) = batch(group);
+        added(row) *= slope(group);
+      }
+      o.covariates.push_back(beside);
+      test::set_y(o, o.y + added);
+      (follows ? with_true : with_random) += std::ranges::any_of(explained(o).unknown, is_product_with_batch);
+    }
+  EXPECT_LE(with_random, 1);
+  EXPECT_GE(with_true, 8);
+}
+
 TEST_F(Products, OfConditionsThatGoTogetherAreNotTried) {
   Observations o = observations();
   Covariate twin = *o.find("belt_tension_N");
