@@ -108,7 +108,9 @@ void check_encoding(std::string_view text, const std::string& file) {
   int line = 1;
   while (!text.empty()) {
     const std::size_t length = utf8_length(text);
-    if (length == 0) throw InputError::at(file, line, "this is not UTF-8 text");
+    if (length == 0)
+      throw InputError::at(
+          file, line, "this is not UTF-8 text: save it as UTF-8 (a letter like ° or µ in another encoding?)");
     if (text[0] == '\0') throw InputError::at(file, line, "this is not a text file (it holds a byte 0)");
     if (text[0] == '\n') ++line;
     text.remove_prefix(length);
@@ -200,8 +202,11 @@ std::optional<double> Sheet::number(std::size_t row, std::string_view column) co
 
 double Sheet::require_number(std::size_t row, std::string_view column) const {
   require(column);
-  if (const auto value = number(row, column)) return *value;
-  throw InputError(fmt::format("{}: a number is required here", where(row, column)));
+  const std::string& cell = text(row, column);
+  if (const auto value = parse_number(cell)) return *value;
+  throw InputError(
+      fmt::format("{}: a number is required here{}", where(row, column),
+                  trimmed(cell).empty() ? "" : fmt::format(", and '{}' is no finite decimal one", cell)));
 }
 
 double Sheet::require_number_within(std::size_t row, std::string_view column, double most) const {

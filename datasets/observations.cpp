@@ -49,8 +49,8 @@ Observation read_row(const Sheet& sheet, std::size_t row, const TableSchema& sch
                           .air_pressure_Pa = schema.air_pressure_Pa};
   const auto response = converted(sheet, row, schema.response);
   if (!response)
-    throw InputError(
-        fmt::format("{}: the response must not be empty", sheet.where(row, schema.response.column)));
+    throw InputError(fmt::format("{}: the response must not be empty: take the row out if there is none",
+                                 sheet.where(row, schema.response.column)));
   observation.response = *response;
   for (const std::string& column : schema.groups) {
     observation.group += (observation.group.empty() ? "" : " / ") + sheet.text(row, column);

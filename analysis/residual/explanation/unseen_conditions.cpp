@@ -138,8 +138,10 @@ std::vector<std::string> collinear_with(const Observations& observations, const 
   std::vector<std::string> result;
   if (!covariate.value.allFinite() || is_constant(covariate) || !covariate.labels.empty()) return result;
   for (const Covariate& other : observations.covariates)
-    if (other.name != covariate.name && other.labels.empty() && !(other.derived && covariate.derived) &&
-        can_be_followed(observations, other) && std::abs(correlation(covariate, other)) >= kCollinear)
+    if (other.name != covariate.name && other.labels.empty() && other.value.allFinite() &&
+        !(other.derived && covariate.derived) && can_be_followed(observations, other) &&
+        std::max(std::abs(correlation(covariate, other)), std::abs(rank_correlation(covariate, other))) >=
+            kCollinear)
       result.push_back(other.name);
   return result;
 }

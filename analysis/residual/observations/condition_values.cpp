@@ -40,6 +40,21 @@ double correlation(const Covariate& first, const Covariate& second) {
   return norms > 0 ? u.dot(v) / norms : 0;
 }
 
+double rank_correlation(const Covariate& first, const Covariate& second) {
+  const auto ranked = [](Covariate covariate) {
+    for (Index c = 0; c < covariate.value.cols(); ++c) {
+      std::vector<double> sorted(covariate.value.col(c).begin(), covariate.value.col(c).end());
+      std::ranges::sort(sorted);
+      for (double& x : covariate.value.col(c)) {
+        const auto [from, to] = std::ranges::equal_range(sorted, x);
+        x = static_cast<double>((from - sorted.begin()) + (to - sorted.begin()));
+      }
+    }
+    return covariate;
+  };
+  return correlation(ranked(first), ranked(second));
+}
+
 const Covariate* number_of_texts(const Observations& observations, const Covariate& texts) {
   if (texts.labels.empty()) return nullptr;
   for (const Covariate& number : observations.covariates) {

@@ -12,6 +12,9 @@ namespace tunnelrig {
 /// Over all rows, of the first channel; 0 where one of them is constant.
 double correlation(const Covariate& first, const Covariate& second);
 
+/// Of their places in order (Spearman): ±1 where one rises or falls with the other, along whatever curve.
+double rank_correlation(const Covariate& first, const Covariate& second);
+
 /// The column of numbers that has one value for each of these texts, and another for each other: what goes
 /// with the texts is told by it. Null where there is none.
 const Covariate* number_of_texts(const Observations& observations, const Covariate& texts);

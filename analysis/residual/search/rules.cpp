@@ -19,8 +19,7 @@ using Eigen::Index;
 std::optional<std::string> only_bends(const SearchData& data, const Found& found, const Term& term,
                                       const NullFit& variances, const CrossValidation& with_term) {
   // A law that the baseline has, of a condition that is no load of a cell, may bend as well as the cell.
-  const bool of_law = term.effect->of_force_alone() && !data.observations().baseline_over.empty() &&
-                      !data.observations().line_of_cell;
+  const bool of_law = goes_by_the_law_alone(*term.effect, data.observations());
   for (const Curve& curve : data.curves_to_try()) {
     const auto shares = [&](const Accepted& other) {
       return is_over(curve, own_conditions(*other.term.effect, data.observations())) &&
