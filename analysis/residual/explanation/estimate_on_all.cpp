@@ -111,6 +111,7 @@ void estimate_on_all(const Models& models, const Observations& observations,
         point.high - point.low > kMostOfTheCourse * static_cast<double>(rows.size());
   }
   warn_of_doubts(explanation);
+  warn_of_blocks_of_their_own(wide, whole, rows, explanation);
   warn_of_noisy_speed(wide, predict_response(wide, whole.model, rows), explanation);
   for (const FoundCurve& curve : found.curves)
     explanation.unknown.push_back(describe(wide, whole, curve, rows));

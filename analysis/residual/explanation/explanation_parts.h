@@ -81,6 +81,10 @@ void warn_of_doubts(Explanation& explanation);
 void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
                          Explanation& explanation);
 
+/// Effects whose amplitude within blocks is another than from one block to the next.
+void warn_of_blocks_of_their_own(const Observations& observations, const JointFit& fit,
+                                 const std::vector<int>& rows, Explanation& explanation);
+
 /// Conditions that none of the candidates follows, and that go with an adopted effect so nearly that its
 /// size, by its own error, does not tell the two.
 void warn_of_companions(const Observations& observations, const std::vector<const Effect*>& effects,

@@ -1,0 +1,78 @@
+// Whether an effect does within blocks what it does from one block to the next.
+#include "analysis/residual/explanation/explanation_parts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace tunnelrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Beside the groups' constants: what each block has of a column on the average.
+MatrixXd block_means(const Observations& observations, const MatrixXd& column) {
+  MatrixXd beside = column;
+  for (const auto& [group, own] : places_of_each(observations.group))
+    beside(own, Eigen::all).rowwise() -= Eigen::RowVectorXd(column(own, Eigen::all).colwise().mean());
+  for (const auto& [block, own] : places_of_each(observations.block))
+    beside(own, Eigen::all).rowwise() = Eigen::RowVectorXd(beside(own, Eigen::all).colwise().mean().eval());
+  return beside;
+}
+
+/// Amplitudes of the parts of a column that blocks differ by, and that differs within them.
+struct TwoAmplitudes {
+  double within = 0, between = 0, standard_error = 0;  // of their difference
+};
+
+/// `k`: the column of the fit, in place of which its two parts are fitted.
+TwoAmplitudes apart(const Observations& observations, const JointFit& fit, std::size_t k,
+                    const std::vector<int>& rows) {
+  std::vector<Components> columns = fit.linear.columns;
+  Components between = columns[k];
+  between[0] = block_means(observations, columns[k][0]);
+  columns[k][0] -= between[0];
+  columns.push_back(std::move(between));
+  const Components y = difference(response_components(observations), fit.linear.offset);
+  const auto [amplitude, covariance, information] =
+      fit_amplitudes(observations, y, columns, fit.variances, rows);
+  const auto one = static_cast<Index>(k), two = amplitude.size() - 1;
+  return {amplitude(one), amplitude(two),
+          std::sqrt(std::max(0.0, covariance(one, one) + covariance(two, two) - 2 * covariance(one, two)))};
+}
+
+}  // namespace
+
+void warn_of_blocks_of_their_own(const Observations& observations, const JointFit& fit,
+                                 const std::vector<int>& rows, Explanation& explanation) {
+  constexpr double kTold = 3;  // standard errors
+  constexpr double kRounding = 1e-12;
+  if (observations.blocks_are_rows) return;
+  for (std::size_t t = 0; t < explanation.adopted.size(); ++t) {
+    const auto& places = fit.linear.of_parameters;
+    const auto place = std::ranges::find(places, ParameterPlace{t, 0});
+    if (place == places.end()) continue;
+    const auto k = static_cast<std::size_t>(std::distance(places.begin(), place));
+    const Components& column = fit.linear.columns[k];
+    const bool of_courses =
+        std::any_of(column.begin() + 1, column.end(), [](const MatrixXd& own) { return !own.isZero(0); });
+    const MatrixXd between = block_means(observations, column[0]);
+    const double all = column[0].squaredNorm();
+    if (of_courses || between.squaredNorm() < kRounding * all) continue;
+    const TwoAmplitudes of = apart(observations, fit, k, rows);
+    if (!(std::abs(of.within - of.between) > kTold * of.standard_error)) continue;
+    const AdoptedEffect& adopted = explanation.adopted[t];
+    const double value = fit.model.terms[t].parameters[0];
+    const char* block = observations.from_table ? "block" : "session";
+    explanation.warnings.push_back(fmt::format(
+        "{}: its {} is {:.3g} within {}s and {:.3g} from one to the next, {:.1f} standard errors apart: its "
+        "condition was read too coarsely to be followed within a {}, or something else changes with it",
+        adopted.term.label(), adopted.parameters[0].name, value + of.within, block, value + of.between,
+        std::abs(of.within - of.between) / of.standard_error, block));
+  }
+}
+
+}  // namespace tunnelrig
