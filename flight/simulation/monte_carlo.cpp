@@ -1,6 +1,7 @@
 #include "flight/simulation/monte_carlo.h"
 
 #include "datasets/error.h"
+#include "datasets/in_threads.h"
 #include "flight/simulation/run_exchange.h"
 
 #include <atomic>
@@ -206,10 +207,7 @@ Comparison fly_runs(const FlightTask& task, std::string_view controller, const G
   };
   const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   const int workers = std::min(task.workers > 0 ? task.workers : cores, task.runs);
-  std::vector<std::thread> threads;
-  for (int i = 1; i < workers; ++i) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
+  in_threads(workers, work);
   if (failed) std::rethrow_exception(failed);
   if (task.processes != nullptr) exchange_runs(*task.processes, all.runs, pooled);
   summarise(all);

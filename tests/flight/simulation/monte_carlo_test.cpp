@@ -4,8 +4,11 @@
 #include "flight/tuning/cma_es.h"
 
 #include <cmath>
+#include <system_error>
+#include <thread>
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 
 namespace tunnelrig {
 namespace {
@@ -46,6 +49,20 @@ void expect_same(const Comparison& a, const Comparison& b) {
 TEST_F(MonteCarlo, IsTheSameToTheBitWhateverTheNumberOfWorkers) {
   const Comparison one = fly_runs(task(6, 1), "ibs-map", frozen_gains());
   for (const int workers : {1, 2, 5}) expect_same(one, fly_runs(task(6, workers), "ibs-map", frozen_gains()));
+}
+
+/// A machine that is full of threads, or a limit on them, must not end the program.
+TEST_F(MonteCarlo, FliesWithTheThreadsThatItGets) {
+  const Comparison one = fly_runs(task(3, 1), "ibs-map", frozen_gains());
+  pthread_attr_t before, without_room;
+  ASSERT_EQ(pthread_getattr_default_np(&before), 0);
+  ASSERT_EQ(pthread_attr_init(&without_room), 0);
+  ASSERT_EQ(pthread_attr_setstacksize(&without_room, std::size_t{1} << 60), 0);
+  ASSERT_EQ(pthread_setattr_default_np(&without_room), 0);
+  EXPECT_THROW(std::thread([] {}).join(), std::system_error);
+  const Comparison alone = fly_runs(task(3, 3), "ibs-map", frozen_gains());
+  ASSERT_EQ(pthread_setattr_default_np(&before), 0);
+  expect_same(one, alone);
 }
 
 TEST_F(MonteCarlo, RunsDifferAndSoDoSeeds) {
