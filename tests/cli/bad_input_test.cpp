@@ -288,9 +288,15 @@ TEST_F(BadInput, ConditionsThatNoSheetCanHold) {
 /// A run at another place than was asked for would be found out much later.
 TEST_F(BadInput, APlanAndARun) {
   write_text(folder / "plan.csv", "session,location,repeat\nS1,OT,1\n");
-  for (const char* option : {"--location H4V0", "--session S2"})
-    EXPECT_THAT(refusal_of(std::string("log --db c.db --plan plan.csv --speed max ") + option, {"plan.csv"}),
-                HasSubstr("--plan says where and when"));
+  const std::string log = "log --db c.db --plan plan.csv --speed max ";
+  for (const char* option : {"--location H4V0", "--session S2", "--kind tare", "--repeat 3", "--duration 5"})
+    EXPECT_THAT(refusal_of(log + option, {"plan.csv"}), HasSubstr("is for one run; --plan says it"));
+  for (const char* option : {"--kind tare", "--repeat 3"}) {
+    EXPECT_THAT(refusal_of(log + "--live 0 " + option, {"plan.csv"}),
+                HasSubstr("is for one run; --plan says it"));
+    EXPECT_THAT(refusal_of(std::string("log --db c.db --speed max --live 0 ") + option, {"plan.csv"}),
+                HasSubstr("is of the run at --location"));
+  }
 }
 
 /// The frames of such a run have no number that holds them.
