@@ -142,6 +142,11 @@ TEST(Comparisons, AreMadeRunByRun) {
   EXPECT_NEAR(0.5 * (more->high_m - more->low_m), 2.093 * 1.026e-4 / std::sqrt(20.0), 1e-6);
   other.runs.pop_back();
   EXPECT_FALSE(paired_difference(one, other)) << "not the same runs";
+  one.runs = {{.rms_y_m = 1}, {.rms_y_m = 2}, {.rms_y_m = 3}};
+  other.runs = {{.rms_y_m = 2}, {.rms_y_m = 2}, {.rms_y_m = 2}};
+  const auto few = paired_difference(one, other);
+  ASSERT_TRUE(few);
+  EXPECT_NEAR(few->high_m, 4.302652730 / std::sqrt(3.0), 1e-7) << "few runs, where t is far from normal";
   one.lost = 1;
   EXPECT_FALSE(paired_difference(one, one));
 }
