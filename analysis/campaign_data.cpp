@@ -2,6 +2,7 @@
 
 #include "analysis/run_summary.h"
 #include "datasets/error.h"
+#include "datasets/in_threads.h"
 #include "datasets/statistics_store.h"
 
 #include <algorithm>
@@ -10,12 +11,11 @@
 #include <exception>
 #include <mutex>
 #include <set>
-#include <thread>
 
 namespace tunnelrig {
 namespace {
 
-constexpr unsigned kThreads = 2;
+constexpr int kThreads = 2;
 
 /// The same sums in the same order give the same numbers to the last bits; what differs more was not computed
 /// from these data.
@@ -109,9 +109,7 @@ std::map<std::string, RunStatistics> statistics_from_raw(
       next = runs.size();
     }
   };
-  std::vector<std::thread> threads;
-  for (unsigned i = 0; i < kThreads; ++i) threads.emplace_back(work);
-  for (std::thread& thread : threads) thread.join();
+  in_threads(kThreads, work);
   if (failure) std::rethrow_exception(failure);
   return statistics;
 }

@@ -238,6 +238,8 @@ int run_fly(const FlyOptions& given, const CLI::App& verb) {
                                  options.blind_s[0], options.blind_s[1]));
   check_places(options);
   refuse_unused(options, verb);
+  if (!options.tune.empty() && processes.count() > 1)
+    throw InputError("--tune: each of mpirun's processes would do all of it; say it without mpirun");
   if (!options.tune.empty()) return tune_all(options);
   const NamedMap map = map_of(options);
   const GainTable gains =

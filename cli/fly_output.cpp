@@ -137,8 +137,8 @@ std::string comparison_csv(const FlownScenario& flown) {
   return text;
 }
 
-/// What controllers are compared by, run by run: they all fly the same ones.
-void add_runs(nlohmann::ordered_json& controller, const Comparison& c) {
+/// What controllers are compared by, run by run: `all` of them fly the same ones.
+void add_runs(nlohmann::ordered_json& controller, const Comparison& c, const std::vector<Comparison>& all) {
   auto errors = nlohmann::ordered_json::array(), contacts = nlohmann::ordered_json::array();
   for (const RunResult& run : c.runs) {
     errors.push_back(error_mm(run.rms_m()));
@@ -146,6 +146,11 @@ void add_runs(nlohmann::ordered_json& controller, const Comparison& c) {
   }
   controller["rms_of_runs_mm"] = std::move(errors);
   controller["contacts_of_runs"] = std::move(contacts);
+  auto& more = controller["more_than_mm"] = nlohmann::ordered_json::object();
+  for (const Comparison& other : all) {
+    if (const auto difference = paired_difference(c, other); difference && &other != &c)
+      more[other.controller] = {error_mm(difference->low_m), error_mm(difference->high_m)};
+  }
 }
 
 std::string position_of(const FlightTask& task) {
@@ -172,7 +177,7 @@ std::string flight_for_report(const FlownScenario& flown, const FlightTask& task
                            {"y_m", column(log, [](const LogRow& r) { return r.reference_m[0]; })},
                            {"z_m", column(log, [](const LogRow& r) { return r.reference_m[1]; })}};
     }
-    add_runs(json["controllers"][i], flown.controllers[i]);
+    add_runs(json["controllers"][i], flown.controllers[i], flown.controllers);
     json["controllers"][i]["path"] = {{"y_m", column(log, [](const LogRow& r) { return r.position_m[0]; })},
                                       {"z_m", column(log, [](const LogRow& r) { return r.position_m[1]; })}};
   }

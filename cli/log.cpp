@@ -11,6 +11,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -50,8 +51,6 @@ bool ask_operator(Logging& logging, const PlannedRun& planned, const PlannedRun*
 }
 
 int run_plan(const LogOptions& options) {
-  if (!options.location.empty() || !options.session.empty())
-    throw InputError("--plan says where and when; --location and --session are for one run without it");
   const std::vector<PlannedRun> plan = read_plan(options.plan);
   Logging logging(options);
   const std::vector<PlannedRun> left = runs_left(logging.file(), plan);
@@ -112,9 +111,22 @@ std::string what_is_kept(const std::string& db, const std::set<std::string>& bef
   }
 }
 
-int run_log(const LogOptions& options, const CLI::App& verb) {
+/// What would be left out in silence.
+void refuse_unused(const LogOptions& options, const CLI::App& verb) {
   if (options.source != "virtual")
     refuse_given(verb, {"--speed", "--seed", "--faults"}, "is for the virtual rig, not for another --source");
+  constexpr std::string_view kOfPlan = "is for one run; --plan says it of each of its own";
+  if (!options.plan.empty()) {
+    refuse_given(verb, {"--kind", "--repeat"}, kOfPlan);
+    // With a page session and duration are those of runs that it adds to the plan's.
+    if (!options.live_port) refuse_given(verb, {"--location", "--session", "--duration"}, kOfPlan);
+  } else if (options.live_port && options.location.empty()) {
+    refuse_given(verb, {"--kind", "--repeat"}, "is of the run at --location, which is not given");
+  }
+}
+
+int run_log(const LogOptions& options, const CLI::App& verb) {
+  refuse_unused(options, verb);
   if (!(options.duration_s > 0 && options.duration_s <= kLongestRun_s))
     throw InputError(
         fmt::format("--duration {:g}: seconds, above 0, at most {:g}", options.duration_s, kLongestRun_s));
@@ -157,7 +169,9 @@ void add_log(CLI::App& app, Work& work) {
   verb->add_option("--location", options->location, "Label of the location: H4V-2, OT, OS, GND1.25, …");
   verb->add_option("--repeat", options->repeat, "Number of the run at this location")->capture_default_str();
   verb->add_option("--session", options->session, "One set-up of the rig on one day");
-  verb->add_option("--duration", options->duration_s, "Seconds; a plan has its own")->capture_default_str();
+  verb->add_option("--duration", options->duration_s,
+                   "Seconds; a plan has its own, and with --live this is for the page's runs")
+      ->capture_default_str();
   verb->add_option("--kind", options->kind, "tare: motors stopped")
       ->check(CLI::IsMember({"thrust", "tare"}))
       ->capture_default_str();

@@ -119,6 +119,51 @@ WrittenMaps write_with_progress(const MapOptions& options, const TunnelMaps& map
                     {.nodes = options.nodes, .provenance = provenance, .progress = show_on(bar, "row")});
 }
 
+/// Of runs that the maps lack, or that no propeller can have made; whether there is a problem among them.
+bool warn_of_runs(const CampaignData& data, const Reduction& reduction) {
+  bool problem = false;
+  for (const LeftOutRun& run : reduction.left_out) {
+    problem = problem || run.problem;
+    if (run.problem || run.reason.starts_with("excluded"))
+      warn(fmt::format("run {} is left out: {}", run.run, run.reason));
+  }
+  if (const auto doubt = implausible_thrust(data, reduction); doubt && doubt->certain) {
+    warn(fmt::format("{}: {}", doubt->found, doubt->advice));
+    problem = true;
+  }
+  return problem;
+}
+
+void warn_of_maps(const WrittenMaps& written, bool scatter_known, double beyond) {
+  if (!scatter_known)
+    warn(fmt::format(
+        "how far C_T and U scatter is not known (no location was repeated, and there are no raw data): {}",
+        written.map.delta_ct.u95_known() ? "the maps' uncertainty is without it"
+                                         : "nor is the maps' uncertainty, of which there is no picture"));
+  if (const auto& offset = written.map.uneven_thrust_fit.offset; offset && offset->significant())
+    warn(
+        fmt::format("U of {} is seen where symmetry demands 0, which is the rig's and not the tunnel's "
+                    "(check propellers.csv, "
+                    "arms, cells); it has been taken out of the map",
+                    offset_text(*offset)));
+  warn_of_extrapolation(beyond);
+  if (written.warning) warn(*written.warning);
+}
+
+void print_json(const WrittenMaps& written, const Reduction& reduction,
+                const std::vector<std::string>& not_on_map, double beyond) {
+  nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},
+                              {"method", written.map.method},
+                              {"model", reduction.model_name()},
+                              {"locations", written.map.locations.size()},
+                              {"not_on_the_map", not_on_map},
+                              {"beyond_percent", 100 * beyond},
+                              {"delta_ct", fit_json(written.map.delta_ct_fit)},
+                              {"uneven_thrust", fit_json(written.map.uneven_thrust_fit)}};
+  for (const auto& path : written.files) json["files"].push_back(path.string());
+  fmt::print("{}\n", json.dump(1));
+}
+
 int run_map(const MapOptions& options) {
   check_nodes(options.nodes);
   const MapMethod method = naming("--method", [&] { return map_method(options.method); });
@@ -142,41 +187,11 @@ int run_map(const MapOptions& options) {
   keep_result(options.db, "map",
               nlohmann::json{{"calibration", data.certificate_id}, {"model", reduction.model.version}}.dump(),
               format_disturbance_map(written.map));
-  bool problem = false;
-  for (const LeftOutRun& run : reduction.left_out) {
-    problem = problem || run.problem;
-    if (run.problem || run.reason.starts_with("excluded"))
-      warn(fmt::format("run {} is left out: {}", run.run, run.reason));
-  }
-  if (const auto doubt = implausible_thrust(data, reduction); doubt && doubt->certain) {
-    warn(fmt::format("{}: {}", doubt->found, doubt->advice));
-    problem = true;
-  }
-  if (!maps.input.scatter_known)
-    warn(fmt::format(
-        "how far C_T and U scatter is not known (no location was repeated, and there are no raw data): {}",
-        written.map.delta_ct.u95_known() ? "the maps' uncertainty is without it"
-                                         : "nor is the maps' uncertainty, of which there is no picture"));
-  if (const auto& offset = written.map.uneven_thrust_fit.offset; offset && offset->significant())
-    warn(
-        fmt::format("U of {} is seen where symmetry demands 0, which is the rig's and not the tunnel's "
-                    "(check propellers.csv, "
-                    "arms, cells); it has been taken out of the map",
-                    offset_text(*offset)));
+  const bool problem = warn_of_runs(data, reduction);
   const double beyond = measured_region(written.map).share_outside();
-  warn_of_extrapolation(beyond);
-  if (written.warning) warn(*written.warning);
+  warn_of_maps(written, maps.input.scatter_known, beyond);
   if (options.json) {
-    nlohmann::ordered_json json{{"format", "tunnelrig-map-summary/1"},
-                                {"method", written.map.method},
-                                {"model", reduction.model_name()},
-                                {"locations", written.map.locations.size()},
-                                {"not_on_the_map", not_on_map},
-                                {"beyond_percent", 100 * beyond},
-                                {"delta_ct", fit_json(written.map.delta_ct_fit)},
-                                {"uneven_thrust", fit_json(written.map.uneven_thrust_fit)}};
-    for (const auto& path : written.files) json["files"].push_back(path.string());
-    fmt::print("{}\n", json.dump(1));
+    print_json(written, reduction, not_on_map, beyond);
   } else {
     print(written, beyond);
     fmt::print("model {}\n", reduction.model_name());

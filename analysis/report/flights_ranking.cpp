@@ -1,7 +1,5 @@
 #include "analysis/report/flights_ranking.h"
 
-#include "calibration/distributions.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -22,31 +20,27 @@ double contacts_of(const Json& controller) { return controller["contacts"].get<d
 
 using Interval = std::pair<double, double>;
 
-std::optional<Interval> interval_mm(const Json& controller) {
-  const Json interval = controller.value("ci95_rms_mm", Json());
+std::optional<Interval> interval_in(const Json& object, const std::string& key) {
+  const Json interval = object.value(key, Json());
   if (!interval.is_array() || interval.size() != 2 || !interval[0].is_number() || !interval[1].is_number())
     return {};
   return Interval(interval[0].get<double>(), interval[1].get<double>());
 }
 
-/// Of the mean of what `one` errs more than `other` in the same run; nothing where runs are not known.
+std::optional<Interval> interval_mm(const Json& controller) { return interval_in(controller, "ci95_rms_mm"); }
+
+/// Of the mean of what `one` errs more than `other` in the same run, as `fly` computed it; nothing where a
+/// flight was lost, of a single run, and in a file of an earlier program.
 std::optional<Interval> difference_mm(const Json& one, const Json& other) {
-  if (has_lost(one) || has_lost(other)) return {};
-  const Json a = one.value("rms_of_runs_mm", Json()), b = other.value("rms_of_runs_mm", Json());
-  if (!a.is_array() || a.size() != b.size() || a.size() < 2) return {};
-  const auto n = static_cast<double>(a.size());
-  double mean = 0, squares = 0;
-  const auto difference = [&](std::size_t i) { return a[i].get<double>() - b[i].get<double>(); };
-  for (std::size_t i = 0; i < a.size(); ++i) mean += difference(i) / n;
-  for (std::size_t i = 0; i < a.size(); ++i) squares += std::pow(difference(i) - mean, 2);
-  const double half = half_width_95(std::sqrt(squares / (n - 1) / n), n - 1);
-  return Interval(mean - half, mean + half);
+  const Json more = one.value("more_than_mm", Json());
+  if (has_lost(one) || has_lost(other) || !more.is_object()) return {};
+  return interval_in(more, other["name"].get<std::string>());
 }
 
 bool errors_differ(const Json& one, const Json& other) {
   if (const auto difference = difference_mm(one, other))
     return difference->first > 0 || difference->second < 0;
-  const auto a = interval_mm(one), b = interval_mm(other);  // of a file that has no runs
+  const auto a = interval_mm(one), b = interval_mm(other);  // of a file that has no differences
   return !a || !b || a->first > b->second || b->first > a->second;
 }
 

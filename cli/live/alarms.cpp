@@ -54,7 +54,7 @@ std::string Alarms::json() const {
                               {"text", alarm.text},
                               {"since_utc", alarm.since_utc}});
   }
-  return json.dump();
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);  // the system's texts
 }
 
 std::string Alarms::of_run() const {

@@ -10,8 +10,8 @@
 namespace tunnelrig::live {
 
 /// Alarms by kind ("clipping", "stuck", "dead", "overload", "speed", "tare_drift", "loss", "disk", "silent",
-/// "test_pattern")
-/// and rotor (0: of the whole rig). One that comes and goes stays for five seconds, so that it can be read.
+/// "test_pattern", "display") and rotor (0: of the whole rig). One that comes and goes stays for five
+/// seconds, so that it can be read.
 class Alarms {
  public:
   using Time = std::chrono::steady_clock::time_point;

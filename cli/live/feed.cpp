@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <iterator>
 #include <system_error>
 
@@ -149,9 +150,23 @@ void LiveFeed::work() {
       std::unique_lock lock(mutex_);
       if (stop_.wait_until(lock, next, [&] { return stopping_; })) return;
     }
-    tick(std::chrono::steady_clock::now());
+    const Time now = std::chrono::steady_clock::now();
+    try {
+      tick(now);
+      tell_failure({}, now);
+    } catch (const std::exception& error) {  // the recording goes on without a page, or with a poorer one
+      tell_failure(error.what(), now);
+    }
     next = std::max(next + kTick, std::chrono::steady_clock::now());
   }
+}
+
+/// `why`: empty where all went well.
+void LiveFeed::tell_failure(const std::string& why, Time now) {
+  const std::lock_guard lock(mutex_);
+  alarms_.set("display", 0, !why.empty(),
+              fmt::format("this page is not up to date: {}; the recording goes on", why), now);
+  if (!why.empty() && alarms_.settle(now)) viewers_.tell("alarms", alarms_.json());
 }
 
 void LiveFeed::tick(Time time) {

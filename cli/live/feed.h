@@ -103,6 +103,7 @@ class LiveFeed {
   Shared shared() const;
   void work();
   void tick(Time now);
+  void tell_failure(const std::string& why, Time now);
   void take_frames(const Shared& now);
   void send_frames(const Scale& scale, bool all);
   void send_spectrum(const Scale& scale, std::optional<double> speed_rpm);

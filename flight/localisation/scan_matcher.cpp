@@ -335,7 +335,6 @@ struct ScanMatcher::Work {
     match.position_m = fit.pose.position;
     match.rotation_rad = fit.pose.rotation_rad;
     match.covariance_m2 = fit.covariance.topLeftCorner<2, 2>();
-    match.rotation_sigma_rad = std::sqrt(fit.covariance(2, 2));
     match.heading_rad = imu.yaw_rad;
     if (settings.unknowns == Unknowns::rotation_and_heading) {
       // Yaw makes the section appear wider by 1 / cos(yaw); its own error there is that of the cosine

@@ -91,8 +91,7 @@ struct Match {
   double rotation_rad = 0;  // what is to be added to the attitude's roll; 0 where it is taken as known
   double heading_rad = 0;  // |yaw| that the scan shows (its sign leaves no trace); the attitude's where known
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  // of the position
-  double rotation_sigma_rad = 0;                            // 0 where known
-  double heading_sigma_rad = 0;
+  double heading_sigma_rad = 0;                             // 0 where known
   double quality = 0;     // share of the beams with a return that fit, 0 … 1
   double residual_m = 0;  // RMS of those
   bool accepted = false;  // a position that is not accepted must not be used

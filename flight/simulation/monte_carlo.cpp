@@ -1,6 +1,8 @@
 #include "flight/simulation/monte_carlo.h"
 
+#include "calibration/distributions.h"
 #include "datasets/error.h"
+#include "datasets/in_threads.h"
 #include "flight/simulation/run_exchange.h"
 
 #include <atomic>
@@ -14,15 +16,6 @@ namespace tunnelrig {
 namespace {
 
 constexpr double kLostError_m = std::numeric_limits<double>::infinity();
-
-/// 97.5 % point of Student's t, within 1 % from three degrees of freedom on (Cornish and Fisher's expansion).
-double student_975(int degrees) {
-  if (degrees == 1) return 12.706;
-  if (degrees == 2) return 4.303;
-  const double z = 1.959964, n = degrees, z2 = z * z;
-  return z + z * (z2 + 1) / (4 * n) + z * (5 * z2 * z2 + 16 * z2 + 3) / (96 * n * n) +
-         z * (3 * z2 * z2 * z2 + 19 * z2 * z2 + 17 * z2 - 15) / (384 * n * n * n);
-}
 
 /// One worker's vehicle, field, estimator and controller; run() may be called for any runs in any order.
 class Worker {
@@ -134,7 +127,7 @@ void summarise(Comparison& all) {
   if (all.runs.size() < 2)
     half = std::numeric_limits<double>::infinity();  // one run says nothing of how runs differ
   else if (all.lost == 0)
-    half = student_975(static_cast<int>(n) - 1) * std::sqrt(squares / (n - 1) / n);
+    half = half_width_95(std::sqrt(squares / (n - 1) / n), n - 1);
   all.rms_y_m = std::sqrt(y2);
   all.rms_z_m = std::sqrt(z2);
   all.estimator_rms_m = std::sqrt(e2);
@@ -156,7 +149,7 @@ std::optional<MeanInterval> paired_difference(const Comparison& one, const Compa
   double mean = 0, squares = 0;
   for (std::size_t i = 0; i < one.runs.size(); ++i) mean += difference_m(i) / n;
   for (std::size_t i = 0; i < one.runs.size(); ++i) squares += std::pow(difference_m(i) - mean, 2);
-  const double half = student_975(static_cast<int>(n) - 1) * std::sqrt(squares / (n - 1) / n);
+  const double half = half_width_95(std::sqrt(squares / (n - 1) / n), n - 1);
   return MeanInterval{mean - half, mean + half};
 }
 
@@ -206,10 +199,7 @@ Comparison fly_runs(const FlightTask& task, std::string_view controller, const G
   };
   const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   const int workers = std::min(task.workers > 0 ? task.workers : cores, task.runs);
-  std::vector<std::thread> threads;
-  for (int i = 1; i < workers; ++i) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
+  in_threads(workers, work);
   if (failed) std::rethrow_exception(failed);
   if (task.processes != nullptr) exchange_runs(*task.processes, all.runs, pooled);
   summarise(all);

@@ -125,7 +125,7 @@ NearestWall CrossSection::nearest_wall(const SectionPoint& point) const {
         nearest_on_segment(vertices_[i], vertices_[(i + 1) % vertices_.size()], point);
     const double distance = (on_edge - point).norm();
     if (distance >= nearest.distance_m) continue;
-    nearest = {distance, i, on_edge, SectionPoint(-along_z_[i], along_y_[i]).normalized()};
+    nearest = {distance, i, on_edge};
   }
   return nearest;
 }

@@ -28,7 +28,6 @@ struct NearestWall {
   double distance_m = 0;  // always positive
   std::size_t edge = 0;   // index of the edge, which runs from vertex `edge` to the next
   SectionPoint point{0, 0};
-  SectionPoint inward_normal{0, 0};  // of the edge, unit length
 };
 
 /// A simple polygon, its vertices counter-clockwise. Immutable and safe to share among threads.

@@ -71,65 +71,71 @@ struct Campaign {
   std::vector<double> c_t, u_percent;  // truth by location "X0", "X1", …
 };
 
-Campaign make_campaign(const Scenario& s, std::mt19937_64& engine) {
-  std::normal_distribution<double> unit;
-  const auto normal = [&](double sigma) { return sigma * unit(engine); };
-  Campaign campaign;
-  CampaignData& data = campaign.data;
-  data.info = parse_campaign_toml(reference_campaign_toml(), "campaign.toml");
-  if (s.tachometer_rpm > 0) data.info.uncertainty.speed_rpm = s.tachometer_rpm;
-  if (s.thermometer_K > 0) data.info.uncertainty.air_temperature_K = s.thermometer_K;
+/// Draws one campaign: cells and their calibration, sessions with their tares, runs.
+class CampaignMaker {
+ public:
+  CampaignMaker(const Scenario& scenario, std::mt19937_64& engine) : s_(scenario), engine_(engine) {}
 
-  // calibration bench
-  std::array<double, 4> zero{}, gain{}, k{};
-  std::vector<CalibrationPoint> points;
-  std::vector<PropellerTest> tests;
-  for (std::size_t i = 0; i < 4; ++i) {
-    zero[i] = 0.34 + normal(0.02);
-    gain[i] = 0.242 * (1 + normal(0.01));
-    k[i] = 1 + (i < 2 ? -0.015 : 0.015) + normal(0.004);
-  }
-  const double k_mean = (k[0] + k[1] + k[2] + k[3]) / 4;
-  for (std::size_t i = 0; i < 4; ++i) {
-    k[i] /= k_mean;
-    for (int p = 0; p < 10; ++p) {
-      const double force = std::uniform_real_distribution<double>(4.9, 9.8)(engine);
-      points.push_back({.cell = static_cast<int>(i) + 1,
-                        .applied_force_N = force + normal(s.gauge_N),
-                        .voltage_V = zero[i] + gain[i] * force + normal(s.reading_V),
-                        .line = p + 2});
+  Campaign make() {
+    data_.info = parse_campaign_toml(reference_campaign_toml(), "campaign.toml");
+    if (s_.tachometer_rpm > 0) data_.info.uncertainty.speed_rpm = s_.tachometer_rpm;
+    if (s_.thermometer_K > 0) data_.info.uncertainty.air_temperature_K = s_.thermometer_K;
+    calibrate_cells();
+    for (int l = 0; l < s_.locations; ++l) {
+      campaign_.c_t.push_back(0.107 * (1 + 0.05 * std::sin(1.7 * l)));
+      campaign_.u_percent.push_back(2 * std::cos(0.9 * l));
+      scatter_.push_back(s_.uneven_scatter ? std::exp(0.9 * std::sin(2.3 * l)) : 1);
     }
-    for (int p = 0; p < 4; ++p) {
-      tests.push_back({.propeller = std::string(1, static_cast<char>('A' + i)),
-                       .rotor = static_cast<int>(i) + 1,
-                       .direction = i < 2 ? "CCW" : "CW",
-                       .thrust_N = 7.4 * k[i] * (1 + normal(0.0015)),
-                       .line = p + 2});
+    tachometer_rpm_ = normal(s_.tachometer_rpm);
+    thermometer_K_ = normal(s_.thermometer_K);
+    for (int session = 0; session < s_.sessions; ++session) begin_session(session);
+    add_runs();
+    return std::move(campaign_);
+  }
+
+ private:
+  using Volts = std::array<double, 4>;
+
+  double normal(double sigma) { return sigma * unit_(engine_); }
+
+  void calibrate_cells() {
+    std::vector<CalibrationPoint> points;
+    std::vector<PropellerTest> tests;
+    for (std::size_t i = 0; i < 4; ++i) {
+      zero_[i] = 0.34 + normal(0.02);
+      gain_[i] = 0.242 * (1 + normal(0.01));
+      k_[i] = 1 + (i < 2 ? -0.015 : 0.015) + normal(0.004);
     }
+    const double k_mean = (k_[0] + k_[1] + k_[2] + k_[3]) / 4;
+    for (std::size_t i = 0; i < 4; ++i) {
+      k_[i] /= k_mean;
+      for (int p = 0; p < 10; ++p) {
+        const double force = std::uniform_real_distribution<double>(4.9, 9.8)(engine_);
+        points.push_back({.cell = static_cast<int>(i) + 1,
+                          .applied_force_N = force + normal(s_.gauge_N),
+                          .voltage_V = zero_[i] + gain_[i] * force + normal(s_.reading_V),
+                          .line = p + 2});
+      }
+      for (int p = 0; p < 4; ++p) {
+        tests.push_back({.propeller = std::string(1, static_cast<char>('A' + i)),
+                         .rotor = static_cast<int>(i) + 1,
+                         .direction = i < 2 ? "CCW" : "CW",
+                         .thrust_N = 7.4 * k_[i] * (1 + normal(0.0015)),
+                         .line = p + 2});
+      }
+    }
+    data_.certificate = calibrate(points, tests);
   }
-  data.certificate = calibrate(points, tests);
 
-  // truth
-  std::vector<double> scatter;
-  for (int l = 0; l < s.locations; ++l) {
-    campaign.c_t.push_back(0.107 * (1 + 0.05 * std::sin(1.7 * l)));
-    campaign.u_percent.push_back(2 * std::cos(0.9 * l));
-    scatter.push_back(s.uneven_scatter ? std::exp(0.9 * std::sin(2.3 * l)) : 1);
-  }
-  const double tachometer = normal(s.tachometer_rpm), thermometer = normal(s.thermometer_K);
-
-  // sessions and their tares
-  std::vector<double> session_factor, visit_factor;
-  std::vector<Zeros> session_zero;
-  const auto add_run = [&](const std::string& location, int session, int repeat, RunKind kind, double at_s,
-                           const std::array<double, 4>& volts, double celsius) {
+  void add_run(const std::string& location, int session, int repeat, RunKind kind, double at_s,
+               const Volts& volts, double celsius) {
     Run run;
-    run.run = "R" + std::to_string(data.runs.size());
+    run.run = "R" + std::to_string(data_.runs.size());
     run.location = location;
     run.session = "S" + std::to_string(session);
     run.repeat = repeat;
     run.kind = kind;
-    run.start_s = at_s;
+    run.start_s = 86400.0 * session + at_s;
     run.numbers["air_temperature_C"] = celsius;
     RunStatistics statistics{.hash = "h", .frames = 80000};
     for (std::size_t i = 0; i < 4; ++i) {
@@ -140,55 +146,69 @@ Campaign make_campaign(const Scenario& s, std::mt19937_64& engine) {
                                      .lowest_V = 0.1,
                                      .highest_V = 3});
     }
-    data.raw[run.run] = {.run = run.run, .state = RunState::kComplete, .frames = 80000, .hash = "h"};
-    data.statistics[run.run] = statistics;
-    data.runs.push_back(run);
-  };
-  for (int session = 0; session < s.sessions; ++session) {
-    session_factor.push_back(1 + normal(s.session));
-    std::array<double, 4> volts{};
-    for (std::size_t i = 0; i < 4; ++i) volts[i] = zero[i] + (s.tares > 0 ? normal(0.003) : 0);
-    session_zero.emplace_back(s, volts, engine);
-    for (int tare = 0; tare < s.tares; ++tare) {
-      const double at_s = kSession_s * tare / (s.tares - 1);
-      add_run("OT", session, tare + 1, RunKind::kTare, 86400.0 * session + at_s, session_zero.back().at(at_s),
-              20);
+    data_.raw[run.run] = {.run = run.run, .state = RunState::kComplete, .frames = 80000, .hash = "h"};
+    data_.statistics[run.run] = statistics;
+    data_.runs.push_back(run);
+  }
+
+  void begin_session(int session) {
+    session_factor_.push_back(1 + normal(s_.session));
+    Volts volts{};
+    for (std::size_t i = 0; i < 4; ++i) volts[i] = zero_[i] + (s_.tares > 0 ? normal(0.003) : 0);
+    session_zero_.emplace_back(s_, volts, engine_);
+    for (int tare = 0; tare < s_.tares; ++tare) {
+      const double at_s = kSession_s * tare / (s_.tares - 1);
+      add_run("OT", session, tare + 1, RunKind::kTare, at_s, session_zero_.back().at(at_s), 20);
     }
   }
 
-  // runs
-  std::vector<std::vector<double>> visits(static_cast<std::size_t>(s.locations),
-                                          std::vector<double>(static_cast<std::size_t>(s.sessions)));
-  for (auto& row : visits) {
-    for (double& factor : row) factor = 1 + normal(s.visit);
-  }
-  for (std::size_t l = 0; l < campaign.c_t.size(); ++l) {
-    std::vector<int> choice(static_cast<std::size_t>(s.sessions));
-    std::iota(choice.begin(), choice.end(), 0);
-    std::shuffle(choice.begin(), choice.end(), engine);
-    for (int repeat = 0; repeat < s.repeats; ++repeat) {
-      const bool everywhere = s.visits == 0 || (s.anchor && l == 0);
-      const int session = choice[static_cast<std::size_t>(repeat % (everywhere ? s.sessions : s.visits))];
-      const auto si = static_cast<std::size_t>(session);
-      const double celsius = 20 + normal(2);
-      const double omega = 2 * M_PI * (5000 + tachometer) / 60;  // set to 5000 by a tachometer that is off
-      const double density = 101325 / (287.058 * (celsius + 273.15));
-      const double total = campaign.c_t[l] * 0.5 * density * omega * omega * 0.1524 * 0.1524 * M_PI * 0.1524 *
-                           0.1524 * session_factor[si] * visits[l][si] * (1 + normal(s.run * scatter[l]));
-      const double at_s = std::fmod(7919.0 * static_cast<double>(data.runs.size()), kSession_s);
-      std::array<double, 4> volts = session_zero[si].at(at_s);
-      for (std::size_t i = 0; i < 4; ++i) {
-        const double side = i == 0 || i == 3 ? 1 : -1;
-        const double thrust =
-            total / 4 * (1 + side * campaign.u_percent[l] / 100) * (1 + normal(s.rotor)) * k[i];
-        volts[i] += gain[i] * thrust;
+  void add_runs() {
+    std::vector<std::vector<double>> visits(static_cast<std::size_t>(s_.locations),
+                                            std::vector<double>(static_cast<std::size_t>(s_.sessions)));
+    for (auto& row : visits) {
+      for (double& factor : row) factor = 1 + normal(s_.visit);
+    }
+    for (std::size_t l = 0; l < campaign_.c_t.size(); ++l) {
+      std::vector<int> choice(static_cast<std::size_t>(s_.sessions));
+      std::iota(choice.begin(), choice.end(), 0);
+      std::shuffle(choice.begin(), choice.end(), engine_);
+      for (int repeat = 0; repeat < s_.repeats; ++repeat) {
+        const bool everywhere = s_.visits == 0 || (s_.anchor && l == 0);
+        const int session = choice[static_cast<std::size_t>(repeat % (everywhere ? s_.sessions : s_.visits))];
+        add_thrust_run(l, session, repeat, visits[l][static_cast<std::size_t>(session)]);
       }
-      add_run("X" + std::to_string(l), session, repeat, RunKind::kThrust, 86400.0 * session + at_s, volts,
-              celsius + thermometer);
     }
   }
-  return campaign;
-}
+
+  void add_thrust_run(std::size_t l, int session, int repeat, double visit_factor) {
+    const auto si = static_cast<std::size_t>(session);
+    const double celsius = 20 + normal(2);
+    const double omega = 2 * M_PI * (5000 + tachometer_rpm_) / 60;  // set to 5000 by a tachometer that is off
+    const double density = 101325 / (287.058 * (celsius + 273.15));
+    const double total = campaign_.c_t[l] * 0.5 * density * omega * omega * 0.1524 * 0.1524 * M_PI * 0.1524 *
+                         0.1524 * session_factor_[si] * visit_factor * (1 + normal(s_.run * scatter_[l]));
+    const double at_s = std::fmod(7919.0 * static_cast<double>(data_.runs.size()), kSession_s);
+    Volts volts = session_zero_[si].at(at_s);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const double side = i == 0 || i == 3 ? 1 : -1;
+      const double thrust =
+          total / 4 * (1 + side * campaign_.u_percent[l] / 100) * (1 + normal(s_.rotor)) * k_[i];
+      volts[i] += gain_[i] * thrust;
+    }
+    add_run("X" + std::to_string(l), session, repeat, RunKind::kThrust, at_s, volts,
+            celsius + thermometer_K_);
+  }
+
+  const Scenario& s_;
+  std::mt19937_64& engine_;
+  std::normal_distribution<double> unit_;
+  Campaign campaign_;
+  CampaignData& data_ = campaign_.data;
+  Volts zero_{}, gain_{}, k_{};
+  std::vector<double> scatter_, session_factor_;  // of locations' runs, over others'; of thrusts
+  std::vector<Zeros> session_zero_;
+  double tachometer_rpm_ = 0, thermometer_K_ = 0;
+};
 
 /// A share of locations with its standard error.
 struct Held {
@@ -204,7 +224,7 @@ Ratios ratios_of(const Scenario& scenario, std::uint64_t seed) {
   std::mt19937_64 engine(seed);
   Ratios ratios;
   for (int i = 0; i < scenario.campaigns; ++i) {
-    const Campaign campaign = make_campaign(scenario, engine);
+    const Campaign campaign = CampaignMaker(scenario, engine).make();
     const Summary summary = summarize_locations(campaign.data, reduce_runs(campaign.data, {}));
     ratios.c_t.emplace_back();
     ratios.u.emplace_back();

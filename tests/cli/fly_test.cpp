@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -175,6 +176,22 @@ TEST_F(Fly, AScenarioFlownInTheTunnelThatItAsksFor) {
   const json flights = json::parse(read_text(folder / "f/flights.json"));
   EXPECT_THAT(flights["flights"][0]["extrapolated"].get<std::string>(), differs);
   EXPECT_TRUE(flown("--scenario short.toml --controllers ibs --runs 1")["extrapolated"].is_null());
+}
+
+/// The report shows what is stored, so it says what `fly` printed.
+TEST_F(Fly, StoresByHowMuchControllersDiffer) {
+  const ProgramResult result = run("--scenario short.toml --controllers ibs,indi,pid --runs 3 --out f");
+  ASSERT_EQ(result.code, 0) << result.error;
+  const json controllers = json::parse(read_text(folder / "f/flights.json"))["flights"][0]["controllers"];
+  ASSERT_EQ(controllers.size(), 3U);
+  for (const json& one : controllers) EXPECT_EQ(one.at("more_than_mm").size(), 2U) << one["name"];
+  for (const char* other : {"indi", "pid"}) {
+    const json& more = controllers[other == std::string("indi") ? 1 : 2]["more_than_mm"]["ibs"];
+    EXPECT_THAT(result.out,
+                HasSubstr(fmt::format("{:+.2f} to {:+.2f}", more[0].get<double>(), more[1].get<double>())));
+    const json& less = controllers[0]["more_than_mm"][other];
+    EXPECT_EQ(less[0].get<double>(), -more[1].get<double>());
+  }
 }
 
 TEST_F(Fly, WhatIsNoMapIsRefused) {

@@ -1,4 +1,4 @@
-"""Three processes under mpirun fly what one flies, to the last digit, and only one of them speaks.
+"""Three processes under mpirun fly what one flies, to the last digit, and only one of them speaks. They do not tune.
 
     processes_test.py PROGRAM       exit code 77: there is no mpirun
 """
@@ -24,3 +24,8 @@ with tempfile.TemporaryDirectory() as folder:
     refused = subprocess.run([*mpirun, program, "fly", "--runs", "2", "--map-scale", "99"], capture_output=True, text=True)
     assert refused.returncode == 2, refused.returncode
     assert refused.stderr.count("map_scale") == 1, refused.stderr
+    gains = pathlib.Path(folder) / "gains.toml"
+    untuned = subprocess.run([*mpirun, program, "fly", "--tune", gains, "--budget", "10"], capture_output=True, text=True)
+    assert untuned.returncode == 2, untuned.returncode
+    assert untuned.stderr.count("without mpirun") == 1, untuned.stderr
+    assert not gains.exists()

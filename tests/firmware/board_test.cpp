@@ -1,9 +1,8 @@
-// Sampler, ring, packetiser and commands together, behind the simulated controller; the host's decoder reads
-// the stream.
-#include "simulated/board.h"
-
+// Sampler, ring and packetiser together, behind the simulated controller; the host's decoder reads the
+// stream.
 #include "daq/loss_ledger.h"
 #include "daq/packet_decoder.h"
+#include "firmware/board_requests.h"
 
 #include <array>
 #include <cstring>
@@ -18,6 +17,9 @@ namespace {
 using simulated::Board;
 using simulated::kNak;
 using simulated::kStall;
+using test::set_rate;
+using test::statistics;
+using test::vendor_out;
 
 /// The host's end: every stored frame must be the one that its number says.
 class Host : public PacketSink, public FrameSink {
@@ -74,35 +76,6 @@ class Host : public PacketSink, public FrameSink {
   std::uint64_t next_ = 0;
   const Packet* in_packet_ = nullptr;
 };
-
-int vendor_out(Board& board, std::uint8_t request, std::uint16_t value = 0) {
-  return board.control(0x40, request, value, 0, 0, nullptr);
-}
-
-trw_statistics statistics(Board& board) {
-  std::array<std::uint8_t, TRW_STATISTICS_SIZE> data{};
-  EXPECT_EQ(board.control(0xC0, TRW_USB_STATISTICS, 0, 0, TRW_STATISTICS_SIZE, data.data()),
-            TRW_STATISTICS_SIZE);
-  trw_statistics found{};
-  trw_get_statistics(data.data(), &found);
-  return found;
-}
-
-int set_rate(Board& board, std::uint32_t numerator, std::uint32_t denominator, std::uint32_t oversampling) {
-  std::array<std::uint8_t, TRW_RATE_WISH_SIZE> data{};
-  const trw_rate_wish wish{numerator, denominator, oversampling};
-  trw_put_rate_wish(data.data(), &wish);
-  const int result = board.control(0x40, TRW_USB_SET_RATE, 0, 0, TRW_RATE_WISH_SIZE, data.data());
-  return result == TRW_RATE_WISH_SIZE ? 0 : result;
-}
-
-trw_rate rate(Board& board) {
-  std::array<std::uint8_t, TRW_RATE_SIZE> data{};
-  EXPECT_EQ(board.control(0xC0, TRW_USB_GET_RATE, 0, 0, TRW_RATE_SIZE, data.data()), TRW_RATE_SIZE);
-  trw_rate found{};
-  trw_get_rate(data.data(), &found);
-  return found;
-}
 
 TEST(FirmwareBoard, StreamsEveryFrameInOrder) {
   Board board(7);
@@ -306,74 +279,6 @@ TEST(FirmwareBoard, AnEmptyPacketEndsATransferOfWholePackets) {
     if (size != kNak) sizes.push_back(size);
   }
   EXPECT_EQ(sizes, (std::vector<int>{64, 64, 64, 0}));
-}
-
-TEST(FirmwareBoard, RatesAreThoseTheTimerMakesExactly) {
-  Board board;
-  board.enumerate();
-  EXPECT_EQ(set_rate(board, 4000, 3, 8), 0);
-  EXPECT_EQ(rate(board).ticks_per_frame, 63000u);
-  EXPECT_EQ(rate(board).oversampling, 8u);
-  EXPECT_EQ(set_rate(board, 1333, 1, 1), kStall) << "84 MHz / 1333 is no whole number";
-  EXPECT_EQ(set_rate(board, 1000, 1, 1), 0);
-  EXPECT_EQ(rate(board).ticks_per_frame, 84000u);
-  EXPECT_EQ(set_rate(board, 84000000 / 63004, 1, 8), kStall) << "the scans must be whole, too";
-  EXPECT_EQ(set_rate(board, 1000, 1, 4), kStall) << "no filter for that";
-  EXPECT_EQ(set_rate(board, 0, 1, 1), kStall);
-  EXPECT_EQ(set_rate(board, 1, 0, 1), kStall);
-  EXPECT_EQ(set_rate(board, 12000, 1, 1), kStall) << "more than the stream carries";
-  EXPECT_EQ(set_rate(board, 4000000000u, 1, 1), kStall);
-  EXPECT_EQ(set_rate(board, 10000, 1, 1), 0) << "the fastest";
-  for (const std::uint32_t rate_hz : {7000u, 7500u, 8000u, 10000u})
-    EXPECT_EQ(set_rate(board, rate_hz, 1, 8), kStall) << "a scan takes 18.4 us";
-  EXPECT_EQ(set_rate(board, 84000000, 8 * 1547, 8), kStall);
-  EXPECT_EQ(set_rate(board, 84000000, 8 * 1548, 8), 0) << "6782.9 Hz, the fastest with the filter";
-  EXPECT_EQ(set_rate(board, 1000, 1, 1), 0);
-  vendor_out(board, TRW_USB_START);
-  EXPECT_EQ(set_rate(board, 2000, 1, 1), kStall) << "not while running";
-  EXPECT_EQ(rate(board).ticks_per_frame, 84000u);
-}
-
-TEST(FirmwareBoard, CommandsAnswer) {
-  Board board(0xABCD);
-  board.enumerate();
-  std::array<std::uint8_t, 128> data{};
-  ASSERT_EQ(board.control(0xC0, TRW_USB_IDENTIFY, 0, 0, 128, data.data()), TRW_IDENTITY_SIZE);
-  trw_identity identity{};
-  ASSERT_TRUE(trw_get_identity(data.data(), TRW_IDENTITY_SIZE, &identity));
-  EXPECT_EQ(identity.boot_id, 0xABCDu);
-  EXPECT_EQ(identity.variant, TRW_VARIANT_SIMULATED);
-  EXPECT_EQ(identity.flags & TRW_FLAG_RUNNING, 0);
-  EXPECT_STREQ(identity.describe, "simulated");
-  vendor_out(board, TRW_USB_START, TRW_PATTERN_COUNTER);
-  board.control(0xC0, TRW_USB_IDENTIFY, 0, 0, 128, data.data());
-  trw_get_identity(data.data(), TRW_IDENTITY_SIZE, &identity);
-  EXPECT_NE(identity.flags & TRW_FLAG_RUNNING, 0);
-  EXPECT_EQ(vendor_out(board, TRW_USB_START, 2), kStall);
-  EXPECT_EQ(vendor_out(board, TRW_USB_STOP, 1), kStall);
-  EXPECT_EQ(vendor_out(board, TRW_USB_LOADER, 0), kStall) << "not without its key";
-  EXPECT_FALSE(board.loader_asked);
-  EXPECT_EQ(vendor_out(board, TRW_USB_LOADER, TRW_USB_LOADER_KEY), 0);
-  EXPECT_TRUE(board.loader_asked);
-  EXPECT_EQ(vendor_out(board, 0x77), kStall);
-}
-
-TEST(FirmwareBoard, AmplifiersOnlyWhereTheyAreFitted) {
-  Board board;
-  board.enumerate();
-  std::array<std::uint8_t, 4> data = {200, 0, 9, 0};
-  EXPECT_EQ(board.control(0x40, TRW_USB_SET_AMPLIFIER, 1, 0, 4, data.data()), kStall);
-  board.amplifier_fitted = true;
-  board.power_cycle();
-  board.enumerate();
-  EXPECT_EQ(board.control(0x40, TRW_USB_SET_AMPLIFIER, 1, 0, 4, data.data()), 4);
-  data = {};
-  EXPECT_EQ(board.control(0xC0, TRW_USB_GET_AMPLIFIER, 1, 0, 4, data.data()), 4);
-  EXPECT_EQ(data[0], 200);
-  EXPECT_EQ(board.control(0xC0, TRW_USB_GET_AMPLIFIER, 4, 0, 4, data.data()), kStall);
-  data = {0, 1, 0, 0};
-  EXPECT_EQ(board.control(0x40, TRW_USB_SET_AMPLIFIER, 1, 0, 4, data.data()), kStall)
-      << "gain 256 is refused by the part";
 }
 
 TEST(FirmwareBoard, TestPatternCountsInEveryChannel) {

@@ -85,7 +85,6 @@ class OtgHost {
   std::uint32_t status_ = 0;
   std::deque<std::uint32_t> words_;
   std::map<std::uint32_t, std::vector<std::uint32_t>> fifo_;
-  std::uint32_t flags_ = 0;
   std::map<std::uint32_t, std::uint32_t> in_flags_, out_flags_;
 };
 

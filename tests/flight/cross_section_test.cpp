@@ -49,7 +49,6 @@ TEST(CrossSection, NearestWallOfASquare) {
   EXPECT_NEAR(wall.distance_m, 0.15, 1e-12);
   EXPECT_EQ(wall.edge, 1U);
   EXPECT_TRUE(wall.point.isApprox(SectionPoint(0.75, 0.1)));
-  EXPECT_TRUE(wall.inward_normal.isApprox(SectionPoint(-1, 0)));
 }
 
 TEST(CrossSection, ClearanceOfARolledBar) {

@@ -60,37 +60,41 @@ TEST_F(BestController, TouchesNothingAndErrsLeast) {
   EXPECT_EQ(one["controllers"], 4);
 }
 
-/// Twenty runs, each as far off as `rms_mm`, and what they have in common; the first `touching` touch a wall.
-Json with_runs(Json flight, std::size_t controller, double rms_mm, double jitter_mm, int touching) {
-  Json errors = Json::array(), contacts = Json::array();
-  for (int run = 0; run < 20; ++run) {
-    errors.push_back(rms_mm + 0.5 * run + (run % 2 == 0 ? jitter_mm : -jitter_mm));
-    contacts.push_back(run < touching ? 1 : 0);
-  }
+/// Twenty runs, of which the first `touching` touch a wall.
+Json with_runs(Json flight, std::size_t controller, int touching) {
+  Json contacts = Json::array();
+  for (int run = 0; run < 20; ++run) contacts.push_back(run < touching ? 1 : 0);
   Json& one = flight["controllers"][controller];
   one["runs"] = 20;
-  one["rms_of_runs_mm"] = errors;
   one["contacts_of_runs"] = contacts;
   return flight;
 }
 
-TEST_F(BestController, IsToldFromOthersRunByRun) {
-  const Json three = flight("hover", {{"a", 10, 0}, {"b", 10.3, 0}, {"c", 10.3, 0}});
-  const Json one = best({with_runs(with_runs(with_runs(three, 0, 5, 0.1, 0), 1, 5.3, 0, 0), 2, 5.3, 2, 0)});
+TEST_F(BestController, IsToldFromOthersByTheDifferencesThatFlyStored) {
+  Json three = flight("hover", {{"a", 10, 0}, {"b", 10.3, 0}, {"c", 10.3, 0}});
+  EXPECT_EQ(best({three})["as_good"], Json({"b", "c"}))
+      << "of an earlier program: the means' intervals overlap";
+  three["controllers"][1]["more_than_mm"] = {{"a", {0.2, 0.4}}, {"c", {-1, 1}}};
+  three["controllers"][2]["more_than_mm"] = {{"a", {-0.6, 1.2}}, {"b", {-1, 1}}};
+  const Json one = best({three});
   EXPECT_EQ(one["name"], "a");
   EXPECT_EQ(one["as_good"], Json({"c"})) << "b errs 0.3 mm more in almost every run, c in every other";
+  for (const Json& unread : {Json("none"), Json{{"a", {0.2}}}, Json{{"a", {0.2, nullptr}}}}) {
+    three["controllers"][1]["more_than_mm"] = unread;
+    EXPECT_EQ(best({three})["as_good"], Json({"b", "c"})) << unread;
+  }
 }
 
 TEST_F(BestController, OneContactInTwentyRunsDecidesNothing) {
   const auto two = [&](int touching) {
     const Json pair = flight("hover", {{"near", 5, touching}, {"far", 20, 0}});
-    return best({with_runs(with_runs(pair, 0, 5, 0.1, touching), 1, 20, 0.1, 0)})["name"];
+    return best({with_runs(with_runs(pair, 0, touching), 1, 0)})["name"];
   };
   EXPECT_EQ(two(1), "near") << "Fisher's p is 1";
   EXPECT_EQ(two(4), "near") << "0.11";
   EXPECT_EQ(two(5), "far") << "0.047";
   EXPECT_EQ(two(20), "far");
-  Json broken = with_runs(flight("hover", {{"a", 5, 0}}), 0, 5, 0, 0);
+  Json broken = with_runs(flight("hover", {{"a", 5, 0}}), 0, 0);
   broken["controllers"][0]["contacts_of_runs"].erase(0);
   EXPECT_THROW(best({broken}), InputError);
 }

@@ -44,6 +44,7 @@ constexpr const char* kFlights =
       {"name": "other", "runs": 2, "rms_y_mm": 4.1, "rms_z_mm": 2, "max_y_mm": 9,
       "max_z_mm": 8, "contacts": 0, "first_contact_s": null, "estimator_rms_mm": 1.5, "thrust_saturated_s": 0,
       "rms_of_runs_mm": [4.5, 4.6], "contacts_of_runs": [0, 0],
+      "more_than_mm": {"</script><b>%{x}": [0.2, 1.5]},
       "path": {"y_m": [0, 0.01], "z_m": [0.75, 0.76]}}]}]})";
 
 struct Pages {

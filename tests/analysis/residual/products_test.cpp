@@ -55,9 +55,9 @@ TEST_F(Products, WhatTwoConditionsDoTogetherIsFound) {
   EXPECT_NEAR(found.shape.back().y - found.shape.front().y, 2 * found.amplitude, 1e-12);
   EXPECT_THAT(explanation_text(e),
               testing::HasSubstr("in proportion to how far belt_tension_N is from its mean"));
-  const auto json = nlohmann::json::parse(explanation_json(e))["unknown"][0];
-  EXPECT_EQ(json["times"], "belt_tension_N");
-  EXPECT_TRUE(json["place"].is_null());
+  const auto written = nlohmann::json::parse(explanation_json(e))["unknown"][0];
+  EXPECT_EQ(written["times"], "belt_tension_N");
+  EXPECT_TRUE(written["place"].is_null());
 }
 
 TEST_F(Products, AreFoundInTablesToo) {

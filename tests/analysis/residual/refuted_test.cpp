@@ -163,11 +163,12 @@ TEST_F(Refuted, AStepIsTriedOnlyWhereAGroupGoesOnAcrossIt) {
 /// with it all of the scatter.
 TEST_F(Refuted, AColumnThatTheBaselineHasChangesNoVariance) {
   Observations o = test::simulate({.groups = 1, .sigma = 0.01}, random);
-  o.slopes = MatrixXd::Random(o.rows(), 1);
+  const auto drawn = [&] { return MatrixXd::NullaryExpr(o.rows(), 1, [&] { return even(random); }).eval(); };
+  o.slopes = drawn();
   const std::vector<int> rows = o.all_rows();
   const MixedModel model(o, rows);
   const Components y = {o.y};
-  const Components other = {MatrixXd::Random(o.rows(), 1)};
+  const Components other = {drawn()};
   const Components has = {3.7 * o.slopes + MatrixXd::Constant(o.rows(), 1, 0.31)};
   const NullFit without = CandidateScan(model, {other}, {}).null_fit(y);
   const NullFit with = CandidateScan(model, {other, has}, {}).null_fit(y);

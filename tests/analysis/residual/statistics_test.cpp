@@ -50,6 +50,18 @@ struct Statistics : testing::Test {
     }
     return candidates;
   }
+
+  /// What a search of few simulations says of the `i`th campaign.
+  static Attribution searched(const Observations& o, int i) {
+    SearchSettings settings;
+    settings.simulations = 199;
+    settings.seed = static_cast<std::uint64_t>(i) + 1;
+    return attribute(o, o.all_rows(), test::every_effect(), settings);
+  }
+
+  static bool says_structure(const Attribution& found) {
+    return !found.accepted.empty() || !found.curves.empty();
+  }
 };
 
 /// Largest distances of an empirical distribution from the uniform one: above it (too many small p) and
@@ -157,8 +169,6 @@ TEST_F(Statistics, WhatWouldBeSeenIsSeenFourTimesInFive) {
 
 /// What drifts within a session goes with scatter that drifts too.
 TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
-  SearchSettings settings;
-  settings.simulations = 199;
   constexpr int kCampaigns = 40;
   int said = 0, seen = 0;
   for (int i = 0; i < kCampaigns; ++i) {
@@ -167,9 +177,8 @@ TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
     for (Eigen::Index row = 0; row < o.rows(); ++row)
       slow.value(row, 0) = std::sin(0.5 * static_cast<double>(row));
     o.covariates.push_back(std::move(slow));
-    settings.seed = static_cast<std::uint64_t>(i) + 1;
-    const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
-    said += found.accepted.empty() && found.curves.empty() ? 0 : 1;
+    const Attribution found = searched(o, i);
+    said += says_structure(found) ? 1 : 0;
     seen += found.observations.scatter.run_correlation[1] > 0.4 ? 1 : 0;
   }
   std::cout << said << " of " << kCampaigns << " with structure, " << seen << " with the correlation\n";
@@ -179,8 +188,6 @@ TEST_F(Statistics, RunsThatResembleTheirNeighboursAreNoStructure) {
 
 /// In a model of rotors that are alike, half of such campaigns have structure.
 TEST_F(Statistics, ARotorThatScattersMoreIsNoStructure) {
-  SearchSettings settings;
-  settings.simulations = 199;
   constexpr int kCampaigns = 40;
   int said = 0;
   for (int i = 0; i < kCampaigns; ++i) {
@@ -189,9 +196,7 @@ TEST_F(Statistics, ARotorThatScattersMoreIsNoStructure) {
     MatrixXd y = o.y;
     for (double& value : y.col(i % 4)) value += more(random);
     test::set_y(o, y);
-    settings.seed = static_cast<std::uint64_t>(i) + 1;
-    const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
-    said += found.accepted.empty() && found.curves.empty() ? 0 : 1;
+    said += says_structure(searched(o, i)) ? 1 : 0;
   }
   std::cout << said << " of " << kCampaigns << " with structure\n";
   EXPECT_LE(said, 7) << "binomial (40, 0.06): beyond 7 in 0.2 % of cases";
@@ -199,8 +204,6 @@ TEST_F(Statistics, ARotorThatScattersMoreIsNoStructure) {
 
 /// By normal scatter alone 24 of 180 such campaigns have structure, by signs as well 3.
 TEST_F(Statistics, ScatterThatGoesWithAConditionIsNoStructure) {
-  SearchSettings settings;
-  settings.simulations = 199;
   constexpr int kCampaigns = 60;
   int said = 0;
   for (int i = 0; i < kCampaigns; ++i) {
@@ -212,9 +215,7 @@ TEST_F(Statistics, ScatterThatGoesWithAConditionIsNoStructure) {
       for (double& value : y.row(row))
         value += 0.002 * (std::exp(5 * std::abs(voltage(row) - 16)) - 1) * normal(random);
     test::set_y(o, y);
-    settings.seed = static_cast<std::uint64_t>(i) + 1;
-    const Attribution found = attribute(o, o.all_rows(), test::every_effect(), settings);
-    said += found.accepted.empty() && found.curves.empty() ? 0 : 1;
+    said += says_structure(searched(o, i)) ? 1 : 0;
   }
   std::cout << said << " of " << kCampaigns << " with structure\n";
   EXPECT_LE(said, 5) << "α is 0.02 for names, and again for curves";
@@ -222,8 +223,6 @@ TEST_F(Statistics, ScatterThatGoesWithAConditionIsNoStructure) {
 
 /// Their signs alone would agree by chance in one of sixteen; that they agree in size is what tells.
 TEST_F(Statistics, AFewRunsThatAgreeAreFound) {
-  SearchSettings settings;
-  settings.simulations = 199;
   constexpr int kCampaigns = 10;
   int found = 0;
   for (int i = 0; i < kCampaigns; ++i) {
@@ -232,8 +231,7 @@ TEST_F(Statistics, AFewRunsThatAgreeAreFound) {
     MatrixXd& airspeed = o.covariates.back().value;
     for (const Eigen::Index gust : {3, 15, 30, 44, 71}) airspeed(gust, 0) = 4;
     test::add_effect(o, "axial_wind", {0.0008});  // 6 σ of a run in a gust
-    settings.seed = static_cast<std::uint64_t>(i) + 1;
-    const Attribution result = attribute(o, o.all_rows(), test::every_effect(), settings);
+    const Attribution result = searched(o, i);
     found += result.accepted.size() == 1 && result.accepted[0].term.effect->name == "axial_wind" ? 1 : 0;
   }
   std::cout << found << " of " << kCampaigns << " found\n";

@@ -193,6 +193,42 @@ TEST_F(Watched, ChannelsThatAreWrongAlarm) {
   EXPECT_EQ(feed.end(outcome), "clipping;overload;stuck;tare_drift");
 }
 
+/// The page never costs data, whatever its computations come to. Texts may be no UTF-8: the system's are not
+/// ours.
+TEST(Feed, AFailureIsTheDisplaysAlone) {
+  const test::TemporaryFolder folder;
+  CampaignFile file = test::new_campaign(folder / "c.db");
+  Viewers viewers;
+  std::atomic<bool> failing = true;
+  LiveFeed feed(file.info(), folder / "c.db", viewers,
+                [&](const RunningBlocks& blocks, const Scale& scale, const CampaignInfo& info,
+                    std::optional<double> air_temperature_C) {
+                  if (failing) throw std::runtime_error("no \xFF means");
+                  return plain_means(blocks, scale, info, air_temperature_C);
+                });
+  const auto page = viewers.join();
+  const auto next = [&](const std::string& what) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    while (std::chrono::steady_clock::now() < end) {
+      const EventText event = page->next(std::chrono::milliseconds(100));
+      if (event && event->find(what) != std::string::npos) return *event;
+    }
+    return std::string();
+  };
+  const VirtualRig virtual_rig(file.info(), {});
+  const LiveRun run{.run = "R1", .location = "OT", .session = "S1", .duration_s = 1};
+  feed.begin(run);
+  const LogOutcome outcome = log_run(
+      *virtual_rig.board({.session = "S1", .location = "OT", .duration_s = 1}, 1, {}), file,
+      test::cells("R1"), {.duration_s = 1, .watcher = &feed.watcher()}, test::summarizer(),
+      [&](const LogProgress& progress) { feed.progress(progress); }, test::never_stop());
+  EXPECT_EQ(outcome.state, RunState::kComplete);
+  EXPECT_THAT(next("\"kind\":\"display\""), HasSubstr("means; the recording goes on"));
+  EXPECT_EQ(feed.end(outcome), "display");
+  failing = false;
+  EXPECT_THAT(next("event: state"), HasSubstr("\"means\":[{"));
+}
+
 /// Between a run's end and the next one's begin a stop would end the next one, or be forgotten.
 TEST_F(Watched, OnlyTheRunThatIsRecordedIsStopped) {
   std::atomic<bool> stop = false;

@@ -4,8 +4,11 @@
 #include "flight/tuning/cma_es.h"
 
 #include <cmath>
+#include <system_error>
+#include <thread>
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 
 namespace tunnelrig {
 namespace {
@@ -46,6 +49,20 @@ void expect_same(const Comparison& a, const Comparison& b) {
 TEST_F(MonteCarlo, IsTheSameToTheBitWhateverTheNumberOfWorkers) {
   const Comparison one = fly_runs(task(6, 1), "ibs-map", frozen_gains());
   for (const int workers : {1, 2, 5}) expect_same(one, fly_runs(task(6, workers), "ibs-map", frozen_gains()));
+}
+
+/// A machine that is full of threads, or a limit on them, must not end the program.
+TEST_F(MonteCarlo, FliesWithTheThreadsThatItGets) {
+  const Comparison one = fly_runs(task(3, 1), "ibs-map", frozen_gains());
+  pthread_attr_t before, without_room;
+  ASSERT_EQ(pthread_getattr_default_np(&before), 0);
+  ASSERT_EQ(pthread_attr_init(&without_room), 0);
+  ASSERT_EQ(pthread_attr_setstacksize(&without_room, std::size_t{1} << 60), 0);
+  ASSERT_EQ(pthread_setattr_default_np(&without_room), 0);
+  EXPECT_THROW(std::thread([] {}).join(), std::system_error);
+  const Comparison alone = fly_runs(task(3, 3), "ibs-map", frozen_gains());
+  ASSERT_EQ(pthread_setattr_default_np(&before), 0);
+  expect_same(one, alone);
 }
 
 TEST_F(MonteCarlo, RunsDifferAndSoDoSeeds) {
@@ -125,6 +142,11 @@ TEST(Comparisons, AreMadeRunByRun) {
   EXPECT_NEAR(0.5 * (more->high_m - more->low_m), 2.093 * 1.026e-4 / std::sqrt(20.0), 1e-6);
   other.runs.pop_back();
   EXPECT_FALSE(paired_difference(one, other)) << "not the same runs";
+  one.runs = {{.rms_y_m = 1}, {.rms_y_m = 2}, {.rms_y_m = 3}};
+  other.runs = {{.rms_y_m = 2}, {.rms_y_m = 2}, {.rms_y_m = 2}};
+  const auto few = paired_difference(one, other);
+  ASSERT_TRUE(few);
+  EXPECT_NEAR(few->high_m, 4.302652730 / std::sqrt(3.0), 1e-7) << "few runs, where t is far from normal";
   one.lost = 1;
   EXPECT_FALSE(paired_difference(one, one));
 }
