@@ -53,8 +53,13 @@ ModelCurve model_curve(const Curve& curve, const VectorXd& amplitude, const Obse
   return result;
 }
 
-double jackknife_dof(const Observations& observations) {
-  return std::max(1, std::min(observations.blocks(), static_cast<int>(kMostFolds)) - 1);
+/// Of the jackknife; of curves alone as many as it would have had.
+double jackknife_dof(const Observations& observations, const Explanation& explanation) {
+  std::size_t folds = std::min(static_cast<std::size_t>(observations.blocks()), kMostFolds);
+  for (const AdoptedEffect& adopted : explanation.adopted)
+    for (const ParameterEstimate& parameter : adopted.parameters)
+      if (!parameter.deviations.empty()) folds = std::min(folds, parameter.deviations.size());
+  return std::max(1.0, static_cast<double>(folds) - 1);
 }
 
 /// The explanation's model fitted jointly: amplitudes of its curves, covariance of all its columns, and whose
@@ -133,7 +138,7 @@ Adoption adopt(const Observations& observations, const Explanation& explanation,
   Adoption result;
   ModelVersion model{.baseline = observations.baseline,
                      .multiplicative = observations.multiplicative,
-                     .dof = jackknife_dof(observations),
+                     .dof = jackknife_dof(observations, explanation),
                      .explanation = explanation_json(explanation)};
   const bool curves_wanted = empirical && !explanation.model.curves.empty();
   for (const Curve& curve : explanation.by_sealed_too)

@@ -155,7 +155,10 @@ void LiveFeed::work() {
       tick(now);
       tell_failure({}, now);
     } catch (const std::exception& error) {  // the recording goes on without a page, or with a poorer one
-      tell_failure(error.what(), now);
+      try {
+        tell_failure(error.what(), now);
+      } catch (const std::exception&) {  // nor does it end where there is no memory to say so
+      }
     }
     next = std::max(next + kTick, std::chrono::steady_clock::now());
   }

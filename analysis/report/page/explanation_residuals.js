@@ -54,12 +54,19 @@ function binsOf(x, few = 14) {
       .filter((bin) => bin.length);
 }
 
+/** t(0.975) of few degrees of freedom, then Cornish and Fisher's expansion. */
+function student975(dof) {
+  const z = 1.959964;
+  return [12.706, 4.303, 3.182, 2.776][dof - 1] ??
+      z + (z ** 3 + z) / (4 * dof) + (5 * z ** 5 + 16 * z ** 3 + 3 * z) / (96 * dof ** 2);
+}
+
 function binned(x, y, bins) {
   const at = bins.map((bin) => mean(bin.map((i) => x[i])));
   const middle = bins.map((bin) => mean(bin.map((i) => y[i])));
   const half = bins.map((bin, k) => {
     const squares = bin.reduce((sum, i) => sum + (y[i] - middle[k]) ** 2, 0);
-    return bin.length > 1 ? 1.96 * Math.sqrt(squares / (bin.length - 1) / bin.length) : 0;
+    return bin.length > 1 ? student975(bin.length - 1) * Math.sqrt(squares / (bin.length - 1) / bin.length) : 0;
   });
   return {at, middle, half};
 }

@@ -151,6 +151,7 @@ AmplitudeFit with_prior(const AmplitudeFit& fit, const MatrixXd& precision) {
 /// Where the columns of one curve stand among those of all.
 struct Span {
   Index first, width;
+  bool bends;  // the more the later; levels do not
 };
 
 /// What of a curve the baseline, an effect or another curve can do as well may be of any size in the fit, and
@@ -173,8 +174,8 @@ AmplitudeFit kept_to_their_size(const Observations& observations, const std::vec
   const double together = (own * fit.amplitude.tail(own.cols())).squaredNorm();
   if (!(together > 0)) return fit;
   MatrixXd precision = MatrixXd::Zero(own.cols(), own.cols());
-  for (const auto& [first, width] : spans) {
-    const VectorXd bends = VectorXd::LinSpaced(width, 1, static_cast<double>(width));
+  for (const auto& [first, width, bend] : spans) {
+    const VectorXd bends = VectorXd::LinSpaced(width, 1, bend ? static_cast<double>(width) : 1);
     const MatrixXd x = whole.middleCols(first, width) * bends.asDiagonal();
     precision.block(first, first, width, width) = x.transpose() * x / (kWider2 * together);
   }
@@ -258,7 +259,8 @@ FittedCurve fit_as_drawn(const Observations& observations, const JointFit& fit, 
       result.curve = drawn;
       first = std::ssize(columns);
     }
-    spans.push_back({std::ssize(columns) - static_cast<Index>(effects), std::ssize(drawn.columns)});
+    spans.push_back({std::ssize(columns) - static_cast<Index>(effects), std::ssize(drawn.columns),
+                     drawn.shape != CurveShape::kLevels});
     columns.insert(columns.end(), drawn.columns.begin(), drawn.columns.end());
   }
   const Components y = difference(response_components(observations), fit.linear.offset);

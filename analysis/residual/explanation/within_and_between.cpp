@@ -23,6 +23,20 @@ MatrixXd block_means(const Observations& observations, const MatrixXd& column) {
   return beside;
 }
 
+/// Whether a condition of the effect differs within blocks by more than rounding.
+bool differs_within_blocks(const Observations& observations, const Effect& effect) {
+  constexpr double kRounding = 1e-9;
+  return std::ranges::any_of(effect.covariates, [&](const std::string& name) {
+    const Covariate* covariate = observations.find(name);
+    if (covariate == nullptr) return false;
+    const MatrixXd& all = covariate->value;
+    MatrixXd within = all;
+    for (const auto& [block, own] : places_of_each(observations.block))
+      within(own, Eigen::all).rowwise() -= Eigen::RowVectorXd(all(own, Eigen::all).colwise().mean());
+    return within.norm() > kRounding * (all.rowwise() - Eigen::RowVectorXd(all.colwise().mean())).norm();
+  });
+}
+
 /// Amplitudes of the parts of a column that blocks differ by, and that differs within them.
 struct TwoAmplitudes {
   double within = 0, between = 0, standard_error = 0;  // of their difference
@@ -54,7 +68,10 @@ void warn_of_blocks_of_their_own(const Observations& observations, const JointFi
   for (std::size_t t = 0; t < explanation.adopted.size(); ++t) {
     const auto& places = fit.linear.of_parameters;
     const auto place = std::ranges::find(places, ParameterPlace{t, 0});
-    if (place == places.end()) continue;
+    const AdoptedEffect& adopted = explanation.adopted[t];
+    if (place == places.end() || is_at_bound(fit.model.terms[t], 0) ||
+        !differs_within_blocks(observations, *adopted.term.effect))
+      continue;
     const auto k = static_cast<std::size_t>(std::distance(places.begin(), place));
     const Components& column = fit.linear.columns[k];
     const bool of_courses =
@@ -64,13 +81,15 @@ void warn_of_blocks_of_their_own(const Observations& observations, const JointFi
     if (of_courses || between.squaredNorm() < kRounding * all) continue;
     const TwoAmplitudes of = apart(observations, fit, k, rows);
     if (!(std::abs(of.within - of.between) > kTold * of.standard_error)) continue;
-    const AdoptedEffect& adopted = explanation.adopted[t];
+    const ParameterEstimate& amplitude = adopted.parameters[0];
+    const std::string unit = amplitude.unit == "1" ? "" : " " + amplitude.unit;
     const double value = fit.model.terms[t].parameters[0];
     const char* block = observations.from_table ? "block" : "session";
     explanation.warnings.push_back(fmt::format(
-        "{}: its {} is {:.3g} within {}s and {:.3g} from one to the next, {:.1f} standard errors apart: its "
+        "{}: its {} is {:.3g}{} within {}s and {:.3g}{} from one to the next, {:.1f} standard errors apart: "
+        "its "
         "condition was read too coarsely to be followed within a {}, or something else changes with it",
-        adopted.term.label(), adopted.parameters[0].name, value + of.within, block, value + of.between,
+        adopted.term.label(), amplitude.name, value + of.within, unit, block, value + of.between, unit,
         std::abs(of.within - of.between) / of.standard_error, block));
   }
 }

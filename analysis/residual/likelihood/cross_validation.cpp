@@ -89,6 +89,17 @@ LossDifference compare(const CrossValidation& worse, const CrossValidation& bett
   return result;
 }
 
+double rmse_gain(const CrossValidation& worse, const CrossValidation& better) {
+  CrossValidation of_worse, of_better;
+  for (std::size_t fold = 0; fold < worse.folds.size(); ++fold) {
+    if (!score_the_same_runs(worse.folds[fold], better.folds[fold])) continue;
+    of_worse.folds.push_back(worse.folds[fold]);
+    of_better.folds.push_back(better.folds[fold]);
+  }
+  const double gain = of_worse.rmse() - of_better.rmse();
+  return std::isfinite(gain) ? gain : 0;
+}
+
 bool LossDifference::told_apart() const {
   constexpr double kLikelihoodRatio = 20;
   return mean >= 2 * std::min(standard_error, expected_standard_error) &&

@@ -46,4 +46,7 @@ struct LossDifference {
 };
 LossDifference compare(const CrossValidation& worse, const CrossValidation& better);
 
+/// By how much the rms error of one is larger, over the folds in which both score the same runs; 0 of none.
+double rmse_gain(const CrossValidation& worse, const CrossValidation& better);
+
 }  // namespace tunnelrig

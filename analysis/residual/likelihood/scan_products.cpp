@@ -31,7 +31,7 @@ ScanProducts::ScanProducts(const MixedModel& model, const std::vector<Components
   in_two_threads(strata, [&](std::size_t s) { products_[s] = multiply(s, candidates); });
   for (std::size_t s = 0; s < strata; ++s) {
     touches_.emplace_back();
-    for (const MatrixXd& own : products_[s][0].candidate) touches_[s].push_back(own.trace() > 0);
+    for (const double squares : products_[s][0].squares) touches_[s].push_back(squares > 0);
   }
   if (strata == 1 && adopted_ > 0) take_out_adopted();
 }
@@ -51,6 +51,7 @@ void ScanProducts::take_out_adopted() {
       own -= products.adopted_candidate.middleCols(first_[i], own.cols()).transpose() *
              on_adopted.middleCols(first_[i], own.cols());
     }
+    set_squares(products);
     products.adopted_adopted.resize(0, 0);
     on_adopted_.emplace_back(on_adopted.rightCols(all_ - q));
     products.adopted_candidate.resize(0, all_ - q);
@@ -116,12 +117,12 @@ void ScanProducts::place(std::size_t stratum, const std::vector<Candidate>& cand
 
 std::vector<ScanProducts::Products> ScanProducts::multiply(std::size_t stratum,
                                                            const std::vector<Candidate>& candidates) const {
-  const auto among_all = [&](const Stacked& of_used) {
-    Stacked result = Stacked::Zero(of_used.rows(), all_);
-    result(Eigen::all, used_[stratum]) = of_used;
+  const auto among_kept = [&](const Stacked& of_used) {
+    Stacked result = Stacked::Zero(of_used.rows(), how_many_kept_[stratum]);
+    result(Eigen::all, rows_[stratum]) = of_used;
     return result;
   };
-  const Stacked c = among_all(projected_[stratum]), in_sessions = among_all(by_session_[stratum]);
+  const Stacked c = among_kept(projected_[stratum]), in_sessions = among_kept(by_session_[stratum]);
   std::vector<Products> result(model_.ratios());
   for (std::size_t ratio = 0; ratio < model_.ratios(); ++ratio) {
     const Stacked weighted = sessions_[stratum].weighted(ratio, in_sessions);
@@ -129,14 +130,24 @@ std::vector<ScanProducts::Products> ScanProducts::multiply(std::size_t stratum,
       return c.middleCols(first_a, a).transpose() * c.middleCols(first_b, b) -
              in_sessions.middleCols(first_a, a).transpose() * weighted.middleCols(first_b, b);
     };
-    result[ratio].adopted_adopted = product(0, adopted_, 0, adopted_);
-    result[ratio].adopted_candidate = product(0, adopted_, 0, all_);
+    Products& own = result[ratio];
+    own.adopted_adopted = product(0, adopted_, 0, adopted_);
+    own.adopted_candidate = product(0, adopted_, 0, c.cols());
     for (std::size_t i = 0; i < candidates.size(); ++i) {
-      const auto own = static_cast<Index>(candidates[i].columns.size());
-      result[ratio].candidate.push_back(product(first_[i], own, first_[i], own));
+      const auto width = static_cast<Index>(candidates[i].columns.size());
+      const Index kept = kept_[stratum][i];
+      own.candidate.push_back(kept < 0 ? MatrixXd(MatrixXd::Zero(width, width))
+                                       : product(kept, width, kept, width));
     }
+    set_squares(own);
   }
   return result;
+}
+
+void ScanProducts::set_squares(Products& products) {
+  products.squares.resize(std::ssize(products.candidate));
+  for (std::size_t i = 0; i < products.candidate.size(); ++i)
+    products.squares(static_cast<Index>(i)) = products.candidate[i].trace();
 }
 
 ScanProducts::Data ScanProducts::times(const std::vector<Stacked>& data) const {

@@ -17,15 +17,16 @@ class ScanProducts {
   /// Of one stratum at one ratio.
   struct Products {
     Eigen::MatrixXd adopted_adopted;         // q × q
-    Eigen::MatrixXd adopted_candidate;       // q × (q + K)
+    Eigen::MatrixXd adopted_candidate;       // q × those that are kept
     std::vector<Eigen::MatrixXd> candidate;  // k × k of each
+    Eigen::VectorXd squares;                 // of each candidate's columns
   };
 
   /// Likewise, with data sets.
   struct DataProducts {
     Eigen::VectorXd squares;  // of each data set
     Eigen::VectorXd least;    // of them that rounding may leave of a perfect fit
-    Eigen::MatrixXd columns;  // kept × data sets: the adopted, and of candidates see `kept`
+    Eigen::MatrixXd columns;  // those that are kept × data sets
   };
   using Data = std::vector<std::vector<DataProducts>>;  // stratum, ratio
 
@@ -41,8 +42,8 @@ class ScanProducts {
   Eigen::Index taken_out() const { return taken_out_; }
   const Products& products(std::size_t stratum, std::size_t ratio) const { return products_[stratum][ratio]; }
   Eigen::Index first(std::size_t candidate) const { return first_[candidate]; }  // of its columns
-  /// The first of its columns among DataProducts::columns of a stratum; −1 where they are all 0 there, as
-  /// most are: few effects change a run's course.
+  /// The first of its columns among those that are kept of a stratum: the adopted ones, then of candidates
+  /// what is not 0 there. −1 where it is all 0, as most are: few effects change a run's course.
   Eigen::Index kept(std::size_t candidate, std::size_t stratum) const { return kept_[stratum][candidate]; }
 
   /// Whether a candidate, or any of the adopted columns, is other than 0 in a stratum.
@@ -55,6 +56,7 @@ class ScanProducts {
   void project(std::size_t stratum, const std::vector<const Components*>& items);
   void place(std::size_t stratum, const std::vector<Candidate>& candidates);
   std::vector<Products> multiply(std::size_t stratum, const std::vector<Candidate>& candidates) const;
+  static void set_squares(Products& products);
   void multiply(std::size_t stratum, Stacked sets, Eigen::Index from,
                 std::vector<DataProducts>& result) const;
   void take_out_adopted();

@@ -88,42 +88,54 @@ void StrataFit::accumulate(const Data& data, Index set, int candidate, std::size
   if (candidate < 0 || columns_.kept(i, s) < 0) return;
   const Index own = a.rows() - adopted_;
   a.bottomLeftCorner(own, adopted_) +=
-      weight * p.adopted_candidate.middleCols(columns_.first(i), own).transpose();
+      weight * p.adopted_candidate.middleCols(columns_.kept(i, s), own).transpose();
   a.bottomRightCorner(own, own) += weight * p.candidate[i];
   b.tail(own) += weight * y.segment(columns_.kept(i, s), own);
 }
 
 Eigen::VectorXd StrataFit::scores(const Data& data, Index set, const State& held) const {
-  const Index columns = widths_.empty() ? 0 : columns_.first(widths_.size() - 1) + widths_.back() - adopted_;
+  const std::size_t count = widths_.size();
+  const Index columns = count == 0 ? 0 : columns_.first(count - 1) + widths_.back() - adopted_;
   SmallMatrix normal = SmallMatrix::Zero(adopted_, adopted_);
   SmallVector of_adopted = SmallVector::Zero(adopted_);
   Eigen::MatrixXd beside = Eigen::MatrixXd::Zero(adopted_, columns), on_adopted = beside;
   Eigen::VectorXd with_data = Eigen::VectorXd::Zero(columns);
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(static_cast<Index>(count));
   for (std::size_t s = 0; s < held.ratio.size(); ++s) {
+    const double weight = this->weight(s, held);
+    const ScanProducts::Products& p = columns_.products(s, held.ratio[s]);
     const auto y = data[s][held.ratio[s]].columns.col(set);
-    for (std::size_t i = 0; i < widths_.size(); ++i)
-      if (const Index kept = columns_.kept(i, s); kept >= 0)
-        with_data.segment(columns_.first(i) - adopted_, widths_[i]) +=
-            weight(s, held) * y.segment(kept, widths_[i]);
-    if (!columns_.adopted_touch(s)) continue;
-    accumulate(data, set, -1, s, held, normal, of_adopted);
-    beside += weight(s, held) * columns_.products(s, held.ratio[s]).adopted_candidate.rightCols(columns);
+    const bool adopted_touch = columns_.adopted_touch(s);
+    if (adopted_touch) accumulate(data, set, -1, s, held, normal, of_adopted);
+    squares += weight * p.squares;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Index kept = columns_.kept(i, s), first = columns_.first(i) - adopted_;
+      if (kept < 0) continue;
+      with_data.segment(first, widths_[i]) += weight * y.segment(kept, widths_[i]);
+      if (adopted_touch)
+        beside.middleCols(first, widths_[i]) += weight * p.adopted_candidate.middleCols(kept, widths_[i]);
+    }
   }
   if (adopted_ > 0) {
     on_adopted = factored(std::move(normal)).solve(beside);
     with_data -= on_adopted.transpose() * of_adopted;
   }
-  Eigen::VectorXd result(widths_.size());
-  for (std::size_t i = 0; i < widths_.size(); ++i) {
+  Eigen::VectorXd result(count);
+  for (std::size_t i = 0; i < count; ++i) {
     const Index own = widths_[i], first = columns_.first(i) - adopted_;
+    double& of_this = result(static_cast<Index>(i));
+    if (own == 1) {
+      const double information =
+          squares(static_cast<Index>(i)) - beside.col(first).dot(on_adopted.col(first));
+      of_this = 0.5 * with_data(first) * with_data(first) / std::max(information, 1e-300);
+      continue;
+    }
     SmallMatrix information = -beside.middleCols(first, own).transpose() * on_adopted.middleCols(first, own);
     for (std::size_t s = 0; s < held.ratio.size(); ++s)
       if (columns_.touches(i, s))
         information += weight(s, held) * columns_.products(s, held.ratio[s]).candidate[i];
     const auto score = with_data.segment(first, own);
-    result(static_cast<Index>(i)) =
-        0.5 * (own == 1 ? score(0) * score(0) / std::max(information(0, 0), 1e-300)
-                        : score.dot(factored(std::move(information)).solve(score)));
+    of_this = 0.5 * score.dot(factored(std::move(information)).solve(score));
   }
   return result;
 }
@@ -150,7 +162,7 @@ double StrataFit::residual(const Data& data, Index set, int candidate, std::size
   if (const auto i = static_cast<std::size_t>(candidate); candidate >= 0 && columns_.kept(i, s) >= 0) {
     const Index own = state.amplitude.size() - adopted_;
     const auto of_own = state.amplitude.tail(own);
-    made = p.adopted_candidate.middleCols(columns_.first(i), own).transpose() * of_adopted;
+    made = p.adopted_candidate.middleCols(columns_.kept(i, s), own).transpose() * of_adopted;
     gained += 2 * of_own.dot(y.columns.col(set).segment(columns_.kept(i, s), own) - made) -
               of_own.dot(p.candidate[i] * of_own);
   }

@@ -47,7 +47,8 @@ void leave_out_against_sign(CampaignSource& source, const CampaignResponse& resp
 /// Value, unit, what is known of each run, and y.
 void set_response(const CampaignSource& source, const CampaignResponse& response, Observations& result);
 
-/// Rotors of which nothing can be seen, though others differ.
+/// Rotors of which nothing can be seen: one that never changes, or all where each has a fixed share of a
+/// total.
 void warn_of_unmeasured_rotors(Observations& observations);
 
 }  // namespace tunnelrig

@@ -56,12 +56,12 @@ CurveScan search_effects(SearchState& state) {
 /// What each accepted effect does for blocks that were not seen, beside all that was found.
 void measure_gains(const SearchData& data, Found& found) {
   const JointFit& fit = found.fit;
-  const double with = unseen(data, fit, fit.variances).rmse();
+  const CrossValidation with = unseen(data, fit, fit.variances);
   for (std::size_t t = 0; t < found.accepted.size(); ++t) {
     Observations others = found.accepted[t].term.per_group ? without_own(data.observations(), fit.model, t)
                                                            : data.observations();
     const JointFit without = fit_in_turns(others, fit.model.without_term(t), data.rows());
-    found.accepted[t].gain = unseen(data, others, without, without.variances).rmse() - with;
+    found.accepted[t].gain = rmse_gain(unseen(data, others, without, without.variances), with);
   }
 }
 

@@ -33,7 +33,7 @@ struct Slopes {
 };
 
 Slopes slopes_of(const Units& units, const VectorXd& steady, const VectorXd& varying, const VectorXd& left) {
-  constexpr double kLeast = 1e-6;  // of the most that the condition varies in a unit
+  constexpr double kLeast = 1e-6;  // of what the condition varies in a unit, on the average
   const VectorXd x = within(units, varying), y = within(units, left);
   std::vector<double> squares, slopes, of_steady;
   double rest = 0, dof = 0;
@@ -80,7 +80,8 @@ double p_of_regression(const Slopes& of) {
   const MatrixXd covariance = covariance_with(weight);
   const double spread = std::max(1.0, weight.dot(left_with(weight, covariance).cwiseAbs2()) / dof);
   const double slope = covariance.row(1).dot(design.transpose() * weight.cwiseProduct(of.slope));
-  return student_t_two_sided_p(slope / std::sqrt(spread * covariance(1, 1)), dof);
+  const double p = student_t_two_sided_p(slope / std::sqrt(spread * covariance(1, 1)), dof);
+  return std::isfinite(p) ? p : 1;
 }
 
 /// The largest p among those of groups and of blocks within which one of its conditions is steady and the

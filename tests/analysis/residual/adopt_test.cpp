@@ -5,6 +5,9 @@
 #include "analysis/residual/simulated.h"
 #include "support/seeds.h"
 
+#include <cmath>
+#include <random>
+
 #include <gtest/gtest.h>
 
 namespace tunnelrig {
