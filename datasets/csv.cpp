@@ -192,12 +192,25 @@ std::string Sheet::where(std::size_t row, std::string_view column) const {
   return fmt::format("{}: column {}", place(row), column);
 }
 
+namespace {
+
+/// What else to do about a cell that is no number.
+std::string_view advice(std::string_view cell, bool first_row) {
+  const bool digits = cell.find_first_of("0123456789") != std::string_view::npos;
+  if (digits && cell.find(',') != std::string_view::npos &&
+      cell.find_first_not_of("0123456789+-., ") == std::string_view::npos)
+    return "; a decimal comma: write a point";
+  return !digits && first_row ? "; a row of units: take it out" : "";
+}
+
+}  // namespace
+
 std::optional<double> Sheet::number(std::size_t row, std::string_view column) const {
   const std::string& cell = text(row, column);
   if (trimmed(cell).empty()) return {};
   if (const auto value = parse_number(cell)) return value;
-  throw InputError(fmt::format("{}: '{}' is not a finite decimal number (not recorded: leave it empty)",
-                               where(row, column), cell));
+  throw InputError(fmt::format("{}: '{}' is not a finite decimal number (not recorded: leave it empty{})",
+                               where(row, column), cell, advice(cell, row == 0)));
 }
 
 double Sheet::require_number(std::size_t row, std::string_view column) const {

@@ -56,6 +56,14 @@ TEST(Csv, NamesFileLineAndColumnOfWhatIsWrong) {
   const Sheet sheet = parse_csv("a\nx\n", "t.csv");
   EXPECT_THAT(message_of([&] { (void)sheet.number(0, "a"); }),
               HasSubstr("t.csv:2: column a: 'x' is not a finite"));
+  const Sheet european = parse_csv("a,b\n(N),\"1,5\"\n(N),x\n", "t.csv");
+  EXPECT_THAT(message_of([&] { (void)european.number(0, "a"); }), HasSubstr("a row of units: take it out"));
+  EXPECT_THAT(
+      message_of([&] { (void)european.number(0, "b"); }),
+      HasSubstr("'1,5' is not a finite decimal number (not recorded: leave it empty; a decimal comma"));
+  EXPECT_THAT(message_of([&] { (void)european.number(1, "a"); }), Not(HasSubstr("units")));
+  EXPECT_THAT(message_of([&] { (void)european.require_number(1, "b"); }),
+              HasSubstr("a number is required here, and 'x' is no finite decimal one"));
   EXPECT_THAT(message_of([&] { (void)sheet.require("b"); }),
               HasSubstr("t.csv:1: the required column b is missing"));
 }
