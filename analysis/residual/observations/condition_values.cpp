@@ -46,7 +46,7 @@ double rank_correlation(const Covariate& first, const Covariate& second) {
       std::vector<double> sorted(covariate.value.col(c).begin(), covariate.value.col(c).end());
       std::ranges::sort(sorted);
       for (double& x : covariate.value.col(c)) {
-        const auto [from, to] = std::ranges::equal_range(sorted, x);
+        const auto [from, to] = std::equal_range(sorted.begin(), sorted.end(), x);
         x = static_cast<double>((from - sorted.begin()) + (to - sorted.begin()));
       }
     }
