@@ -62,7 +62,7 @@ TwoAmplitudes apart(const Observations& observations, const JointFit& fit, std::
 
 void warn_of_blocks_of_their_own(const Observations& observations, const JointFit& fit,
                                  const std::vector<int>& rows, Explanation& explanation) {
-  constexpr double kTold = 3;  // standard errors
+  constexpr double kApart = 3;  // standard errors
   constexpr double kRounding = 1e-12;
   if (observations.blocks_are_rows) return;
   for (std::size_t t = 0; t < explanation.adopted.size(); ++t) {
@@ -80,7 +80,7 @@ void warn_of_blocks_of_their_own(const Observations& observations, const JointFi
     const double all = column[0].squaredNorm();
     if (of_courses || between.squaredNorm() < kRounding * all) continue;
     const TwoAmplitudes of = apart(observations, fit, k, rows);
-    if (!(std::abs(of.within - of.between) > kTold * of.standard_error)) continue;
+    if (!(std::abs(of.within - of.between) > kApart * of.standard_error)) continue;
     const ParameterEstimate& amplitude = adopted.parameters[0];
     const std::string unit = amplitude.unit == "1" ? "" : " " + amplitude.unit;
     const double value = fit.model.terms[t].parameters[0];
