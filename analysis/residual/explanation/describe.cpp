@@ -151,14 +151,12 @@ AmplitudeFit with_prior(const AmplitudeFit& fit, const MatrixXd& precision) {
 /// Where the columns of one curve stand among those of all.
 struct Span {
   Index first, width;
-  bool bends;  // the more the later; levels do not
 };
 
 /// What of a curve the baseline, an effect or another curve can do as well may be of any size in the fit, and
-/// be taken back by them. Of the curves that fit about as well the smallest and smoothest are meant: the
-/// columns of each, which bend the more the later they come, have a normal prior of twice the size of what
-/// all curves together do beside baseline and effects, less for those that bend. `effects`: columns before
-/// the curves'.
+/// be taken back by them. Of the curves that fit about as well the smallest are meant: each has a normal
+/// prior of twice the size of what all curves together do beside baseline and effects. `effects`: columns
+/// before the curves'.
 AmplitudeFit kept_to_their_size(const Observations& observations, const std::vector<int>& rows,
                                 const std::vector<Components>& columns, std::size_t effects,
                                 const std::vector<Span>& spans, const AmplitudeFit& fit) {
@@ -174,9 +172,8 @@ AmplitudeFit kept_to_their_size(const Observations& observations, const std::vec
   const double together = (own * fit.amplitude.tail(own.cols())).squaredNorm();
   if (!(together > 0)) return fit;
   MatrixXd precision = MatrixXd::Zero(own.cols(), own.cols());
-  for (const auto& [first, width, bend] : spans) {
-    const VectorXd bends = VectorXd::LinSpaced(width, 1, bend ? static_cast<double>(width) : 1);
-    const MatrixXd x = whole.middleCols(first, width) * bends.asDiagonal();
+  for (const auto& [first, width] : spans) {
+    const auto x = whole.middleCols(first, width);
     precision.block(first, first, width, width) = x.transpose() * x / (kWider2 * together);
   }
   return with_prior(fit, precision);
@@ -259,8 +256,7 @@ FittedCurve fit_as_drawn(const Observations& observations, const JointFit& fit, 
       result.curve = drawn;
       first = std::ssize(columns);
     }
-    spans.push_back({std::ssize(columns) - static_cast<Index>(effects), std::ssize(drawn.columns),
-                     drawn.shape != CurveShape::kLevels});
+    spans.push_back({std::ssize(columns) - static_cast<Index>(effects), std::ssize(drawn.columns)});
     columns.insert(columns.end(), drawn.columns.begin(), drawn.columns.end());
   }
   const Components y = difference(response_components(observations), fit.linear.offset);

@@ -217,15 +217,16 @@ StratumErrors errors_of_stratum(const Observations& observations, const MixedMod
 
 /// Takes the errors of the runs on which an effect acts whose amplitude the fitted runs leave undetermined:
 /// in its place would stand what the columns were linearised at, in which these runs have had their part.
-void remove_unpredictable(const MixedModel& model, const NullFit& null, const Fit& fit,
+/// Whether there are such.
+bool remove_unpredictable(const MixedModel& model, const NullFit& null, const Fit& fit,
                           const std::vector<Plain>& plain, std::vector<StratumErrors>& strata) {
   constexpr double kRounding = 1e-6;
-  if (fit.amplitude.size() == 0) return;
+  if (fit.amplitude.size() == 0) return false;
   VectorXd squares = VectorXd::Zero(fit.amplitude.size());
   for (std::size_t s = 0; s < strata.size(); ++s)
     squares += weight_of(null.sigma[s]) * plain[s].columns.colwise().squaredNorm().transpose();
   const MatrixXd directions = undetermined(fit.equations, squares);
-  if (directions.cols() == 0) return;
+  if (directions.cols() == 0) return false;
   Eigen::Array<bool, Eigen::Dynamic, 1> unknown =
       Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(strata.front().error.rows(), false);
   for (std::size_t s = 0; s < strata.size(); ++s) {
@@ -237,6 +238,7 @@ void remove_unpredictable(const MixedModel& model, const NullFit& null, const Fi
   for (StratumErrors& stratum : strata)
     for (Index mode = 0; mode < stratum.error.cols(); ++mode)
       stratum.error.col(mode) = unknown.select(kNaN, stratum.error.col(mode).array());
+  return unknown.any();
 }
 
 /// From errors of y and what they scatter by.
@@ -283,7 +285,7 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     strata.push_back(
         errors_of_stratum(observations, model, s, fit, null, plain.back(), test_rows, own_groups));
   }
-  remove_unpredictable(model, null, fit, plain, strata);
+  const bool undetermined = remove_unpredictable(model, null, fit, plain, strata);
   const Index n = static_cast<Index>(test_rows.size()), c = observations.channels();
   std::vector<VectorXd> parts;
   MatrixXd error_by_mode = MatrixXd::Zero(n, c), variance_by_mode = MatrixXd::Zero(n, c);
@@ -296,7 +298,7 @@ HeldOutErrors predict_held_out(const Observations& observations, const Component
     error_by_mode.middleCols(stratum.first_mode, stratum.modes) = strata[s].error;
     variance_by_mode.middleCols(stratum.first_mode, stratum.modes) = strata[s].variance;
   }
-  HeldOutErrors result{test_rows, {}, {}, concatenated(parts), fit.amplitude};
+  HeldOutErrors result{test_rows, {}, {}, concatenated(parts), fit.amplitude, undetermined};
   set_in_response_unit(observations, error_by_mode * model.rotors_of_modes(),
                        (variance_by_mode * model.rotors_of_modes().cwiseAbs2()).cwiseSqrt(), result);
   return result;

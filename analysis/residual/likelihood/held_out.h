@@ -17,6 +17,7 @@ struct HeldOutErrors {
   Eigen::VectorXd whitened;      // V^(−½)e over all strata; 0 where there is none
   double loss() const { return whitened.squaredNorm(); }  // eᵀV⁻¹e: what models are compared by
   Eigen::VectorXd amplitude;                              // of the columns, from the fit
+  bool undetermined = false;  // whether runs have no error because the fit leaves their effect undetermined
 
   double sum_of_squares() const;  // of the errors that there are
   Eigen::Index count() const;

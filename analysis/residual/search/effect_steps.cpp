@@ -85,7 +85,7 @@ bool accept(SearchState& state, Trial& trial, std::size_t best) {
   const CrossValidation after = unseen(data, fit, fit.variances);
   // Both are scored by the variances of the larger model, so that the difference is the mean's.
   const CrossValidation before = unseen(data, state.found.fit, fit.variances);
-  if (const auto reason = why_not(data, state.found, fit, after, compare(before, after))) {
+  if (const auto reason = why_not(data, state.found, fit, before, after)) {
     trial.refused += *reason + "; ";
     if (scan.ways[best].per_group && accept_in_groups(state, scan.ways[best], trial.p(best))) return true;
     const Term& bounded = fit.model.terms.back();

@@ -191,7 +191,7 @@ std::vector<Term> names_of_curve(const SearchData& data, const Found& found, std
     if (!tried.insert(scan.ways[i].effect->cause()).second) continue;
     const JointFit fit = fit_with(data, without, scan.ways[i], scan.fits[i].amplitude(0));
     const CrossValidation after = unseen(data, fit, fit.variances);
-    if (why_not(data, before, fit, after, compare(unseen(data, without, fit.variances), after)) ||
+    if (why_not(data, before, fit, unseen(data, without, fit.variances), after) ||
         compare(unseen(data, fit, variances), of_curve).told_apart())
       continue;
     // Less: a small one of its own, beside the curve.

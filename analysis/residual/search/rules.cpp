@@ -35,6 +35,14 @@ std::optional<std::string> only_bends(const SearchData& data, const Found& found
   return {};
 }
 
+/// Whether a block has runs on which a term acts that no other block says anything of: what happened there
+/// may be anything.
+bool is_told_by_one_block(const CrossValidation& without, const CrossValidation& with) {
+  for (std::size_t fold = 0; fold < with.folds.size(); ++fold)
+    if (with.folds[fold].undetermined && !without.folds[fold].undetermined) return true;
+  return false;
+}
+
 /// An effect over a condition of the model's last that is, together with that, no more than a small part of
 /// either: two formulas that differ little make any shape over it. None: null. Of `fit`.
 const Term* cancelled_by_newest(const SearchData& data, const JointFit& fit) {
@@ -102,7 +110,7 @@ bool is_gradual(const SearchData& data, const JointFit& base, const std::vector<
 }
 
 std::optional<std::string> why_not(const SearchData& data, const Found& found, const JointFit& fit,
-                                   const CrossValidation& after, const LossDifference& gain) {
+                                   const CrossValidation& before, const CrossValidation& after) {
   const Term& term = fit.model.terms.back();
   // Its own amplitude, and those of the effects before it, which it may push out.
   for (auto each = fit.model.terms.rbegin(); each != fit.model.terms.rend(); ++each) {
@@ -111,6 +119,8 @@ std::optional<std::string> why_not(const SearchData& data, const Found& found, c
                ? fmt::format("{} would leave its physical bounds", term.label())
                : fmt::format("with {}, {} would leave its physical bounds", term.label(), each->label());
   }
+  if (is_told_by_one_block(before, after)) return fmt::format("{} is told by one block alone", term.label());
+  const LossDifference gain = compare(before, after);
   if (!(gain.mean > gain.standard_error))
     return fmt::format("{} does not predict unseen blocks", term.label());
   if (lacks_speed_squared(data, found, term))

@@ -12,9 +12,10 @@
 namespace tunnelrig {
 
 /// The rule that keeps a fit's last term out, in words; nothing where none does. `fit`: of what was found and
-/// that term; `after`: its leave-one-block-out losses; `gain`: theirs on those without the term.
+/// that term; `before` and `after`: leave-one-block-out losses without the term and with it, by the same
+/// variances.
 std::optional<std::string> why_not(const SearchData& data, const Found& found, const JointFit& fit,
-                                   const CrossValidation& after, const LossDifference& gain);
+                                   const CrossValidation& before, const CrossValidation& after);
 
 /// Whether it is one of the measured speed, of which the model does not have the square.
 bool lacks_speed_squared(const SearchData& data, const Found& found, const Term& term);

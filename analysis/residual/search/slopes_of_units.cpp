@@ -21,10 +21,10 @@ VectorXd within(const Units& units, const VectorXd& values) {
   return result;
 }
 
-bool is_steady(const Units& units, const VectorXd& values) {
-  constexpr double kSteady = 0.1;  // of its variance
+/// Of a condition's variance, what is within units.
+double share_within(const Units& units, const VectorXd& values) {
   const VectorXd centred = values.array() - values.mean();
-  return within(units, values).squaredNorm() < kSteady * centred.squaredNorm();
+  return within(units, values).squaredNorm() / std::max(centred.squaredNorm(), 1e-300);
 }
 
 /// A slope of each unit, how well it is known, and the steady condition there.
@@ -84,18 +84,53 @@ double p_of_regression(const Slopes& of) {
   return std::isfinite(p) ? p : 1;
 }
 
-/// The largest p among those of groups and of blocks within which one of its conditions is steady and the
-/// other is not; −1: none is.
+/// Of what the condition does to the slope within units, each with a slope of its own.
+double p_within(const Units& units, const VectorXd& steady, const VectorXd& varying, const VectorXd& left) {
+  const VectorXd of_steady = within(units, steady), x = within(units, varying), y = within(units, left);
+  double both = 0, square = 0, rest = 0, dof = -1;
+  for (const auto& own : units) {
+    const VectorXd own_x = x(own), own_y = y(own);
+    if (own.size() < 3 || !(own_x.squaredNorm() > 0)) continue;
+    const auto beside_slope = [&](VectorXd values) -> VectorXd {
+      values.array() -= values.mean();
+      return values - own_x * (own_x.dot(values) / own_x.squaredNorm());
+    };
+    const VectorXd product = beside_slope(own_x.cwiseProduct(VectorXd(of_steady(own))));
+    const VectorXd beside = beside_slope(own_y);
+    both += product.dot(beside);
+    square += product.squaredNorm();
+    rest += beside.squaredNorm();
+    dof += static_cast<double>(own.size()) - 2;
+  }
+  if (!(square > 0) || dof < 1) return 1;
+  rest = std::max(rest - both * both / square, 1e-300);
+  return student_t_two_sided_p(both / std::sqrt(square * rest / dof), dof);
+}
+
+/// Of a product with a condition that is mostly the unit's own: told by the units' slopes, or by what it does
+/// within units where it varies there.
+double p_of_slopes(const Units& units, const VectorXd& steady, const VectorXd& varying,
+                   const VectorXd& left) {
+  constexpr double kNone = 1e-6;
+  const double between = p_of_regression(slopes_of(units, steady, varying, left));
+  if (share_within(units, steady) < kNone) return between;
+  return std::min(1.0, 2 * std::min(between, p_within(units, steady, varying, left)));
+}
+
+/// The largest p among those of groups and of blocks of which one of its conditions mostly is, and the other
+/// is not; −1: none is.
 double p_of_units(const SearchData& data, const VectorXd& left, const Curve& product) {
+  constexpr double kSteady = 0.35;  // two runs of a unit have half of the variance within it by chance
   const Observations& o = data.observations();
   const VectorXd first = product.x(data.rows(), 0), second = o.find(product.times())->value(data.rows(), 0);
   double p = -1;
   for (const std::vector<int>* belongs : {&o.group, &o.block}) {
     const Units units = without_numbers(places_of_each(*belongs, data.rows()));
-    const bool steady_first = is_steady(units, first), steady_second = is_steady(units, second);
+    const bool steady_first = share_within(units, first) < kSteady,
+               steady_second = share_within(units, second) < kSteady;
     if (steady_first == steady_second) continue;
-    p = std::max(p, steady_first ? p_of_regression(slopes_of(units, first, second, left))
-                                 : p_of_regression(slopes_of(units, second, first, left)));
+    p = std::max(
+        p, steady_first ? p_of_slopes(units, first, second, left) : p_of_slopes(units, second, first, left));
   }
   return p;
 }

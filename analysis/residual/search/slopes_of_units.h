@@ -1,4 +1,4 @@
-// What a condition does times another that hardly changes within a group, or within a block.
+// What a condition does times another that is mostly a group's own, or a block's.
 #pragma once
 
 #include "analysis/residual/likelihood/joint_fit.h"
@@ -8,7 +8,7 @@
 
 namespace tunnelrig {
 
-/// Those of `tried` that a product may be found with. Where one of its conditions is nearly constant within
+/// Those of `tried` that a product may be found with. Where one of its conditions is mostly constant within
 /// each group (or block), the product says that the slopes over the other go with it from group to group.
 /// Slopes that differ for reasons of each group's own go with any number that is written beside the groups,
 /// as far as rows are counted: here the groups are. A product stays where a regression of the groups' slopes,
