@@ -125,8 +125,10 @@ TEST(TableSchema, ScatterIsRelativeOrAbsolute) {
 }
 
 TEST(TableSchema, BlocksThatCannotBeHadAreRefused) {
-  EXPECT_THAT(refusal("blocks = \"bins(g, 3)\"\n"),
-              HasSubstr("s.toml:2: blocks = \"bins(g, 3)\": t.csv:2: column g: a number is required here, and 'a' is no"));
+  EXPECT_THAT(
+      refusal("blocks = \"bins(g, 3)\"\n"),
+      HasSubstr(
+          "s.toml:2: blocks = \"bins(g, 3)\": t.csv:2: column g: a number is required here, and 'a' is no"));
   EXPECT_THAT(refusal("blocks = \"bins(x, 2.5)\"\n"),
               HasSubstr("s.toml:2: blocks = \"bins(x, 2.5)\"; write"));
   EXPECT_THAT(refusal("blocks = \"bins(x, 2)\"\n", "", "g,y,x\na,1,0.1\na,2,\n"),
