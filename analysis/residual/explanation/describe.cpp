@@ -148,18 +148,13 @@ AmplitudeFit with_prior(const AmplitudeFit& fit, const MatrixXd& precision) {
   return {solver.solve(fit.information * fit.amplitude), solver.pseudoInverse(), information};
 }
 
-/// Where the columns of one curve stand among those of all.
-struct Span {
-  Index first, width;
-};
-
 /// What of a curve the baseline, an effect or another curve can do as well may be of any size in the fit, and
 /// be taken back by them. Of the curves that fit about as well the smallest are meant: each has a normal
 /// prior of twice the size of what all curves together do beside baseline and effects. `effects`: columns
 /// before the curves'.
 AmplitudeFit kept_to_their_size(const Observations& observations, const std::vector<int>& rows,
                                 const std::vector<Components>& columns, std::size_t effects,
-                                const std::vector<Span>& spans, const AmplitudeFit& fit) {
+                                const std::vector<Index>& widths, const AmplitudeFit& fit) {
   constexpr double kWider2 = 4;
   const MatrixXd all = stacked(columns, rows, observations.channels());
   const auto count = static_cast<Index>(effects);
@@ -172,9 +167,11 @@ AmplitudeFit kept_to_their_size(const Observations& observations, const std::vec
   const double together = (own * fit.amplitude.tail(own.cols())).squaredNorm();
   if (!(together > 0)) return fit;
   MatrixXd precision = MatrixXd::Zero(own.cols(), own.cols());
-  for (const auto& [first, width] : spans) {
+  Index first = 0;
+  for (const Index width : widths) {
     const auto x = whole.middleCols(first, width);
     precision.block(first, first, width, width) = x.transpose() * x / (kWider2 * together);
+    first += width;
   }
   return with_prior(fit, precision);
 }
@@ -248,7 +245,7 @@ FittedCurve fit_as_drawn(const Observations& observations, const JointFit& fit, 
   const std::size_t effects = fit.linear.of_parameters.size();
   std::vector<Components> columns(fit.linear.columns.begin(),
                                   fit.linear.columns.begin() + static_cast<std::ptrdiff_t>(effects));
-  std::vector<Span> spans;
+  std::vector<Index> widths;
   Index first = 0;
   for (const Curve& each : fit.model.curves) {
     const Curve drawn = as_drawn(observations, each, rows);
@@ -256,12 +253,12 @@ FittedCurve fit_as_drawn(const Observations& observations, const JointFit& fit, 
       result.curve = drawn;
       first = std::ssize(columns);
     }
-    spans.push_back({std::ssize(columns) - static_cast<Index>(effects), std::ssize(drawn.columns)});
+    widths.push_back(std::ssize(drawn.columns));
     columns.insert(columns.end(), drawn.columns.begin(), drawn.columns.end());
   }
   const Components y = difference(response_components(observations), fit.linear.offset);
   AmplitudeFit all = fit_amplitudes(observations, y, columns, fit.variances, rows);
-  if (found.x.size() > 0) all = kept_to_their_size(observations, rows, columns, effects, spans, all);
+  if (found.x.size() > 0) all = kept_to_their_size(observations, rows, columns, effects, widths, all);
   const auto k = static_cast<Index>(result.curve.columns.size());
   result.amplitude = all.amplitude.segment(first, k);
   result.covariance = all.covariance.block(first, first, k, k);

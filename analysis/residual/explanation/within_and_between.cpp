@@ -11,16 +11,13 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
-/// Beside the groups' constants: what each block has of a column on the average.
-MatrixXd block_means(const Observations& observations, const MatrixXd& column) {
-  MatrixXd beside = column;
-  for (const auto& [group, own] : places_of_each(observations.group))
-    beside(own, Eigen::all).rowwise() -= Eigen::RowVectorXd(column(own, Eigen::all).colwise().mean());
-  for (const auto& [block, own] : places_of_each(observations.block))
-    beside(own, Eigen::all).rowwise() = Eigen::RowVectorXd(beside(own, Eigen::all).colwise().mean().eval());
-  return beside;
+/// Of the rows of each group, or block, their mean.
+MatrixXd means_of_each(const std::vector<int>& belongs, const MatrixXd& values) {
+  MatrixXd result = values;
+  for (const auto& [number, own] : places_of_each(belongs))
+    result(own, Eigen::all).rowwise() = Eigen::RowVectorXd(values(own, Eigen::all).colwise().mean());
+  return result;
 }
 
 /// Whether a condition of the effect differs within blocks by more than rounding.
@@ -30,9 +27,7 @@ bool differs_within_blocks(const Observations& observations, const Effect& effec
     const Covariate* covariate = observations.find(name);
     if (covariate == nullptr) return false;
     const MatrixXd& all = covariate->value;
-    MatrixXd within = all;
-    for (const auto& [block, own] : places_of_each(observations.block))
-      within(own, Eigen::all).rowwise() -= Eigen::RowVectorXd(all(own, Eigen::all).colwise().mean());
+    const MatrixXd within = all - means_of_each(observations.block, all);
     return within.norm() > kRounding * (all.rowwise() - Eigen::RowVectorXd(all.colwise().mean())).norm();
   });
 }
@@ -42,19 +37,18 @@ struct TwoAmplitudes {
   double within = 0, between = 0, standard_error = 0;  // of their difference
 };
 
-/// `k`: the column of the fit, in place of which its two parts are fitted.
+/// `k`: the column of the fit, in place of which `between` and the rest of it are fitted.
 TwoAmplitudes apart(const Observations& observations, const JointFit& fit, std::size_t k,
-                    const std::vector<int>& rows) {
+                    const MatrixXd& between, const std::vector<int>& rows) {
   std::vector<Components> columns = fit.linear.columns;
-  Components between = columns[k];
-  between[0] = block_means(observations, columns[k][0]);
-  columns[k][0] -= between[0];
-  columns.push_back(std::move(between));
+  columns.push_back(columns[k]);
+  columns[k][0] -= between;
+  columns.back()[0] = between;
   const Components y = difference(response_components(observations), fit.linear.offset);
-  const auto [amplitude, covariance, information] =
-      fit_amplitudes(observations, y, columns, fit.variances, rows);
-  const auto one = static_cast<Index>(k), two = amplitude.size() - 1;
-  return {amplitude(one), amplitude(two),
+  const AmplitudeFit both = fit_amplitudes(observations, y, columns, fit.variances, rows);
+  const MatrixXd& covariance = both.covariance;
+  const auto one = static_cast<Index>(k), two = both.amplitude.size() - 1;
+  return {both.amplitude(one), both.amplitude(two),
           std::sqrt(std::max(0.0, covariance(one, one) + covariance(two, two) - 2 * covariance(one, two)))};
 }
 
@@ -76,10 +70,11 @@ void warn_of_blocks_of_their_own(const Observations& observations, const JointFi
     const Components& column = fit.linear.columns[k];
     const bool of_courses =
         std::any_of(column.begin() + 1, column.end(), [](const MatrixXd& own) { return !own.isZero(0); });
-    const MatrixXd between = block_means(observations, column[0]);
+    const MatrixXd beside = column[0] - means_of_each(observations.group, column[0]);
+    const MatrixXd between = means_of_each(observations.block, beside);
     const double all = column[0].squaredNorm();
     if (of_courses || between.squaredNorm() < kRounding * all) continue;
-    const TwoAmplitudes of = apart(observations, fit, k, rows);
+    const TwoAmplitudes of = apart(observations, fit, k, between, rows);
     if (!(std::abs(of.within - of.between) > kApart * of.standard_error)) continue;
     const ParameterEstimate& amplitude = adopted.parameters[0];
     const std::string unit = amplitude.unit == "1" ? "" : " " + amplitude.unit;
@@ -87,8 +82,7 @@ void warn_of_blocks_of_their_own(const Observations& observations, const JointFi
     const char* block = observations.from_table ? "block" : "session";
     explanation.warnings.push_back(fmt::format(
         "{}: its {} is {:.3g}{} within {}s and {:.3g}{} from one to the next, {:.1f} standard errors apart: "
-        "its "
-        "condition was read too coarsely to be followed within a {}, or something else changes with it",
+        "its condition was read too coarsely to be followed within a {}, or something else changes with it",
         adopted.term.label(), amplitude.name, value + of.within, unit, block, value + of.between, unit,
         std::abs(of.within - of.between) / of.standard_error, block));
   }

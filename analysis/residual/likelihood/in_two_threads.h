@@ -1,29 +1,31 @@
 // Independent jobs on both cores.
 #pragma once
 
-#include <array>
+#include "datasets/in_threads.h"
+
+#include <atomic>
 #include <cstddef>
 #include <exception>
-#include <thread>
+#include <mutex>
 
 namespace tunnelrig {
 
-/// Every other one of `count` jobs in a thread of its own. Throws what a job threw, when both are done.
+/// Jobs 0 to `count` − 1, in whatever order. Throws what a job threw, when no other is under way any more.
 template <class Job>
 void in_two_threads(std::size_t count, const Job& job) {
-  std::array<std::exception_ptr, 2> thrown;
-  const auto work = [&](std::size_t first) {
+  std::atomic<std::size_t> next{0};
+  std::mutex mutex;  // guards thrown
+  std::exception_ptr thrown;
+  in_threads(2, [&] {
     try {
-      for (std::size_t k = first; k < count; k += 2) job(k);
+      for (std::size_t k = next++; k < count; k = next++) job(k);
     } catch (...) {
-      thrown[first] = std::current_exception();
+      const std::lock_guard lock(mutex);
+      thrown = std::current_exception();
+      next = count;
     }
-  };
-  std::thread second(work, 1);
-  work(0);
-  second.join();
-  for (const std::exception_ptr& each : thrown)
-    if (each) std::rethrow_exception(each);
+  });
+  if (thrown) std::rethrow_exception(thrown);
 }
 
 }  // namespace tunnelrig
