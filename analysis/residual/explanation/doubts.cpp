@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include <fmt/format.h>
@@ -242,6 +243,28 @@ void warn_of_tares(const Observations& observations, const MeanModel& model, Exp
   explanation.warnings.push_back(
       fmt::format("the baseline has a constant beside C_T, {}: a tare that was not taken off?",
                   first_few(tares, kNamed)));
+}
+
+void warn_of_single_blocks(const Observations& observations, const std::vector<OfOneBlock>& found,
+                           Explanation& explanation) {
+  constexpr std::size_t kNamed = 4;
+  std::map<int, std::vector<std::string>> over;  // of each block
+  for (const OfOneBlock& each : found) {
+    const auto is_it = [&](const UnknownStructure& unknown) {
+      return unknown.condition == each.covariate && unknown.rotor == each.rotor;
+    };
+    std::vector<std::string>& names = over[each.block];
+    const bool said = std::ranges::count(names, each.covariate) > 0;
+    if (!said && std::ranges::none_of(explanation.unknown, is_it)) names.push_back(each.covariate);
+  }
+  for (const auto& [block, names] : over) {
+    if (names.empty()) continue;
+    explanation.warnings.push_back(fmt::format(
+        "block {} alone shows that the response goes with {}, and the others say nothing of it: it may be "
+        "something else that was special there, so it is no dependence here; the same conditions in other "
+        "blocks would tell",
+        observations.block_name[static_cast<std::size_t>(block)], first_few(names, kNamed)));
+  }
 }
 
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation) {

@@ -93,6 +93,10 @@ void warn_of_companions(const Observations& observations, const std::vector<cons
 /// Constants of a table's thrusts beside their C_T, where the baseline has them.
 void warn_of_tares(const Observations& observations, const MeanModel& model, Explanation& explanation);
 
+/// Blocks that alone show a structure, of which nothing else is reported.
+void warn_of_single_blocks(const Observations& observations, const std::vector<OfOneBlock>& found,
+                           Explanation& explanation);
+
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
 

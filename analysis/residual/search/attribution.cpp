@@ -125,6 +125,7 @@ Attribution attribute(const Observations& observations, const std::vector<int>& 
   Attribution result{.accepted = std::move(found.accepted),
                      .curves = std::move(found.curves),
                      .beyond_bounds = std::move(found.beyond_bounds),
+                     .of_one_block = std::move(state.record.of_one_block),
                      .session_unknown = session_scatter_is_large(data, found.fit),
                      .baseline = std::move(state.record.baseline),
                      .final = found.fit,
@@ -166,6 +167,7 @@ StructureLeft structure_left(const Attribution& before, const JointFit& whole, c
   smooth_curves(data, found, before.curves.size());
   left.curves = {found.curves.begin() + std::ssize(before.curves), found.curves.end()};
   left.fit = std::move(found.fit);
+  left.of_one_block = std::move(state.record.of_one_block);
   left.rounds = std::move(state.record.curve_rounds);
   return left;
 }

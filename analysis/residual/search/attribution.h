@@ -70,6 +70,13 @@ struct FoundCurve {
   std::vector<CouldBe> could_be = {};   // one way of each effect
 };
 
+/// Structure that is beyond chance, and without one block is not: of that block, whatever it was.
+struct OfOneBlock {
+  std::string covariate;
+  int rotor = -1;  // −1: all
+  int block = 0;   // as observations number them
+};
+
 /// Sessions scatter far more than runs.
 struct SessionScatter {
   int rotor = -1;  // −1: what several do
@@ -80,6 +87,7 @@ struct Attribution {
   std::vector<Accepted> accepted;
   std::vector<FoundCurve> curves;
   std::vector<BeyondBounds> beyond_bounds;
+  std::vector<OfOneBlock> of_one_block;  // of each covariate and rotor once
   std::optional<SessionScatter> session_unknown = {};
   JointFit baseline, final;   // without and with the accepted terms and curves
   Observations observations;  // what `final` speaks of: with a group's own amplitudes among its baseline
@@ -97,7 +105,8 @@ struct StructureLeft {
   std::vector<std::vector<CouldBe>> names;      // of each curve that was found before, on all `rows`
   std::vector<std::vector<Ranked>> confounded;  // of `accepted`, what all `rows` do not tell apart either
   JointFit fit;                                 // to all `rows`: what was found, and then these curves
-  std::vector<Round> rounds;                    // of the search
+  std::vector<OfOneBlock> of_one_block;
+  std::vector<Round> rounds;   // of the search
   std::set<std::size_t> bent;  // of `accepted`: what its covariate does bends away from its formula
 };
 /// `found` speaks of its own observations, which must outlive the call. `whole`: its model fitted to `rows`,

@@ -72,9 +72,9 @@ CurveScan scan_bends(const SearchData& data, const Found& found, const Term& ter
   return bends;
 }
 
-std::size_t everywhere_instead(const SearchData& data, const JointFit& base, const CurveScan& curves) {
+std::size_t everywhere_instead(const SearchData& data, const JointFit& base, const CurveScan& curves,
+                               std::size_t best) {
   const auto& [scan, tried] = curves;
-  const std::size_t best = scan.order[0];
   const Curve& found = tried[best];
   if (found.in_place().empty()) return best;
   const auto errors_with = [&](const Curve& curve) {

@@ -15,8 +15,9 @@ CurveScan scan_curves(const SearchData& data, const Found& found);
 /// The bends over an effect's own conditions that no found curve describes.
 CurveScan scan_bends(const SearchData& data, const Found& found, const Term& term);
 
-/// The best one of a scan on top of a fit; where that goes with a place, the same everywhere if it predicts
+/// Curve `best` of a scan on top of a fit; where that goes with a place, the same everywhere if it predicts
 /// about as well.
-std::size_t everywhere_instead(const SearchData& data, const JointFit& base, const CurveScan& curves);
+std::size_t everywhere_instead(const SearchData& data, const JointFit& base, const CurveScan& curves,
+                               std::size_t best);
 
 }  // namespace tunnelrig

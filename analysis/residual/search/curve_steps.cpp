@@ -6,9 +6,11 @@
 #include "analysis/residual/search/effect_steps.h"
 #include "analysis/residual/search/fits.h"
 #include "analysis/residual/search/older_effects.h"
+#include "analysis/residual/search/one_block.h"
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -73,6 +75,21 @@ Curve best_of(const std::vector<Curve>& forms, const SearchData& data, const Joi
   return forms[best];
 }
 
+/// Whether one block alone shows it, which is recorded, and said of the round.
+bool is_of_one_block(SearchState& state, const Curve& curve) {
+  const std::optional<int> block = block_that_alone_shows(state.data, state.found.fit, curve);
+  if (!block) return false;
+  const auto is_said = [&](const OfOneBlock& other) {
+    return other.covariate == curve.covariate && other.rotor == curve.rotor;
+  };
+  if (std::ranges::any_of(state.record.of_one_block, is_said)) return true;
+  state.record.of_one_block.push_back({curve.covariate, curve.rotor, *block});
+  state.record.curve_rounds.back().outcome +=
+      fmt::format("; {} by block {} alone", curve.label(),
+                  state.data.observations().block_name[static_cast<std::size_t>(*block)]);
+  return true;
+}
+
 }  // namespace
 
 void add_curves(SearchState& state, const CurveScan& first) {
@@ -91,17 +108,21 @@ bool add_best_curve(SearchState& state, const CurveScan& curves) {
   state.data.settings().progress("looking for structure without a name");
   const auto& [scan, tried] = curves;
   if (tried.empty()) return false;
-  const std::size_t best = scan.order[0];
   NullMaxima maxima = state.questions.maxima_of(state.data, state.found.fit, scan, Draws::kCurves);
-  const double p = maxima.p(scan.fits[best].evidence);
+  const double p_best = maxima.p(scan.fits[scan.order[0]].evidence);
   Round round;
-  round.observed = scan.fits[best].evidence;
+  round.observed = scan.fits[scan.order[0]].evidence;
   round.null_maxima = maxima.values();
-  round.outcome = fmt::format("p = {:.3g} for {}", p, tried[best].label());
+  round.outcome = fmt::format("p = {:.3g} for {}", p_best, tried[scan.order[0]].label());
   state.record.curve_rounds.push_back(std::move(round));
-  if (p > state.data.settings().alpha) return false;
-  add_curve(state.data, state.found, tried[everywhere_instead(state.data, state.found.fit, curves)], p);
-  return true;
+  for (const std::size_t i : scan.order) {
+    const double p = maxima.p(scan.fits[i].evidence);
+    if (p > state.data.settings().alpha) return false;
+    if (is_of_one_block(state, tried[i])) continue;
+    add_curve(state.data, state.found, tried[everywhere_instead(state.data, state.found.fit, curves, i)], p);
+    return true;
+  }
+  return false;
 }
 
 void smooth_curves(const SearchData& data, Found& found, std::size_t first) {

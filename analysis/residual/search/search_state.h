@@ -24,6 +24,7 @@ namespace tunnelrig {
 struct SearchRecord {
   JointFit baseline;  // without effects and curves
   std::vector<Round> rounds, curve_rounds;
+  std::vector<OfOneBlock> of_one_block;
   Detectable detectable;
 };
 

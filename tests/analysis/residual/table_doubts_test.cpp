@@ -135,5 +135,27 @@ TEST_F(TableDoubts, OneRunFarOutOnACondition) {
   }
 }
 
+/// A day on which all was larger had another level, and from one day to the next nothing goes with it.
+TEST_F(TableDoubts, WhatOneBlockAloneShowsIsNoDependence) {
+  const auto of = [&](int special_days) {
+    std::string csv = "day,level,y\n";
+    for (int r = 0; r < 192; ++r) {
+      const bool special = r / 12 >= 7 && r / 12 < 7 + special_days;
+      csv += fmt::format("{},{},{}\n", r / 12, (special ? 12.3 : 11.1) + 0.03 * scatter(random),
+                         (special ? 10.4 : 10.0) + 0.05 * scatter(random));
+    }
+    return explained(observed(csv,
+                              "blocks = \"day\"\n[response]\ncolumn = \"y\"\nunit = \"1\"\n"
+                              "[[covariates]]\ncolumn = \"level\"\nunit = \"1\"\n"));
+  };
+  const auto of_one = HasSubstr("block 7 alone shows that the response goes with level");
+  const Explanation one = of(1), three = of(3);
+  EXPECT_THAT(one.unknown, testing::IsEmpty()) << explanation_text(one);
+  EXPECT_THAT(one.warnings, Contains(of_one)) << explanation_text(one);
+  ASSERT_EQ(three.unknown.size(), 1u) << explanation_text(three);
+  EXPECT_EQ(three.unknown[0].covariate, "level");
+  EXPECT_THAT(three.warnings, Not(Contains(HasSubstr("alone shows"))));
+}
+
 }  // namespace
 }  // namespace tunnelrig
