@@ -188,17 +188,24 @@ StrataFit::State StrataFit::best_without(const Data& data, Index set) const {
 }
 
 void StrataFit::improve(const Data& data, Index set, int candidate, State& best) const {
+  State tried;  // keeps its memory
   for (std::size_t s = 0; s < model_.strata().size(); ++s) {
     if (candidate < 0 ? !columns_.adopted_touch(s)
                       : !columns_.touches(static_cast<std::size_t>(candidate), s))
       continue;
-    const std::size_t start = best.ratio[s];
-    const std::size_t end = candidate < 0 ? model_.ratios() : start;
-    for (std::size_t ratio = candidate < 0 ? 0 : lowest_tried(start); ratio < end; ++ratio) {
-      State tried = best;
+    const std::size_t start = best.ratio[s], lowest = candidate < 0 ? 0 : lowest_tried(start);
+    const auto is_better_at = [&](std::size_t ratio) {
+      tried = best;
       tried.ratio[s] = ratio;
       solve(data, set, candidate, tried);
-      if (tried.log_likelihood > best.log_likelihood) best = std::move(tried);
+      if (!(tried.log_likelihood > best.log_likelihood)) return false;
+      std::swap(best, tried);
+      return true;
+    };
+    while (best.ratio[s] > lowest && is_better_at(best.ratio[s] - 1)) {
+    }
+    if (candidate >= 0 || best.ratio[s] < start) continue;
+    while (best.ratio[s] + 1 < model_.ratios() && is_better_at(best.ratio[s] + 1)) {
     }
   }
 }

@@ -36,7 +36,8 @@ class StrataFit {
   /// Session variances one stratum after the other, each at its best with the others held.
   State best_without(const Data& data, Eigen::Index set) const;
 
-  /// Tries other session variances where the adopted columns, or a candidate, may take a part of them away.
+  /// Goes to other session variances, from one to the next as long as that is likelier, where the adopted
+  /// columns, or a candidate, may take a part of them away.
   void improve(const Data& data, Eigen::Index set, int candidate, State& best) const;
   static std::size_t lowest_tried(std::size_t ratio) { return ratio > 4 ? ratio - 4 : 0; }
 
