@@ -66,22 +66,21 @@ void centre(std::vector<Drawn>& points) {
   for (Drawn& point : points) point.columns -= mean;
 }
 
-std::vector<Drawn> drawn_levels(const Curve& curve) {
-  const auto k = static_cast<Index>(curve.columns.size());
-  std::vector<double> levels = curve.levels;
-  std::sort(levels.begin(), levels.end());
-  std::vector<Drawn> points;
-  for (const double x : levels) {
-    points.push_back({x, VectorXd(k)});
-    for (Index b = 0; b < k; ++b)
-      points.back().columns(b) = level_column(curve.levels, static_cast<int>(b) + 1, x);
-  }
-  return points;
+/// What stands in a curve's columns where its condition is x.
+VectorXd columns_at(const Curve& curve, double x) {
+  VectorXd result(static_cast<Index>(curve.columns.size()));
+  for (std::size_t b = 0; b < curve.columns.size(); ++b)
+    result(static_cast<Index>(b)) = curve.shape == CurveShape::kLevels
+                                        ? level_column(curve.levels, static_cast<int>(b) + 1, x)
+                                        : tilted_column(curve.shape, curve.tilt, b, x, curve.low, curve.high);
+  if (curve.strength)  // it turns about the mean
+    result.array() -= curve_straight(curve.shape, curve.x.mean(), curve.low, curve.high);
+  return result;
 }
 
 /// From x = `from` to `to`, evenly (in ln x of waves over that); where the rows have few values (`seen`,
-/// ascending) at these, and nowhere further from all of them than the next of the even ones: a bend may have
-/// any height in between.
+/// ascending) at these, and nowhere further from all of them than half way to the next of the even ones: a
+/// bend may have any height in between.
 std::vector<double> places_to_draw(const std::vector<double>& seen, double from, double to,
                                    bool in_logarithm) {
   constexpr int kPoints = 25;
@@ -96,23 +95,15 @@ std::vector<double> places_to_draw(const std::vector<double>& seen, double from,
   if (places.size() > 1) return places;
   places.clear();
   for (int p = 0; p < kPoints; ++p) {
-    const auto next = std::ranges::lower_bound(seen, at(p - 1));
-    if (seen.empty() || (next != seen.end() && *next <= at(p + 1))) places.push_back(at(p));
+    const auto next = std::ranges::lower_bound(seen, (at(p - 1) + at(p)) / 2);
+    if (seen.empty() || (next != seen.end() && *next <= (at(p) + at(p + 1)) / 2)) places.push_back(at(p));
   }
   return places;
 }
 
-/// Of a curve over `low` to `high`.
-std::vector<Drawn> drawn_curve(const Curve& curve, const std::vector<double>& places, double low,
-                               double high) {
+std::vector<Drawn> drawn_at(const Curve& curve, const std::vector<double>& places) {
   std::vector<Drawn> points;
-  for (const double x : places) {
-    points.push_back({x, VectorXd(static_cast<Index>(curve.columns.size()))});
-    for (std::size_t b = 0; b < curve.columns.size(); ++b)
-      points.back().columns(static_cast<Index>(b)) = tilted_column(curve.shape, curve.tilt, b, x, low, high);
-    if (curve.strength)  // it turns about the mean
-      points.back().columns.array() -= curve_straight(curve.shape, curve.x.mean(), low, high);
-  }
+  for (const double x : places) points.push_back({x, columns_at(curve, x)});
   return points;
 }
 
@@ -194,7 +185,8 @@ Curve as_drawn(const Observations& observations, const Curve& curve, const std::
 /// line's, of which the fit gives the curve a part or not: it is taken out of what is drawn.
 void take_out_baseline(const Observations& observations, const std::vector<int>& rows, const Curve& curve,
                        std::vector<Drawn>& points) {
-  if (observations.slopes.cols() == 0 || curve.x.cols() != 1 || curve.strength) return;
+  if (observations.slopes.cols() == 0 || curve.x.cols() != 1 || curve.strength || !curve.labels.empty())
+    return;
   const auto n = static_cast<Index>(rows.size()), k = static_cast<Index>(curve.columns.size());
   const double low = curve.x.minCoeff(), high = curve.x.maxCoeff();
   for (const CurveShape shape : {CurveShape::kStraight, CurveShape::kLogStraight}) {
@@ -208,9 +200,7 @@ void take_out_baseline(const Observations& observations, const std::vector<int>&
       const double x = curve.x(row, 0);
       line.row(r) = straight(x).transpose();
       slopes.row(r) = observations.slopes.row(row);
-      for (Index b = 0; b < k; ++b)
-        columns(r, b) =
-            tilted_column(curve.shape, curve.tilt, static_cast<std::size_t>(b), x, curve.low, curve.high);
+      columns.row(r) = columns_at(curve, x).transpose();
     }
     const auto solver = line.colPivHouseholderQr();
     const MatrixXd bent = slopes - line * solver.solve(slopes);
@@ -268,17 +258,21 @@ FittedCurve fit_as_drawn(const Observations& observations, const JointFit& fit, 
 /// What is drawn, stretch by stretch.
 std::vector<std::vector<Drawn>> pieces_to_draw(const Observations& observations, const Curve& curve,
                                                const std::vector<int>& rows) {
-  if (curve.shape == CurveShape::kLevels) return {drawn_levels(curve)};
   std::vector<std::vector<Drawn>> pieces;
-  if (curve.x.size() == 0) {  // within the run
-    const double duration_s = observations.duration_s.maxCoeff();
-    pieces = {drawn_curve(curve, places_to_draw({}, 0, duration_s, false), 0, duration_s)};
+  if (curve.shape == CurveShape::kLevels) {
+    std::vector<double> levels = curve.levels;
+    std::sort(levels.begin(), levels.end());
+    pieces = {drawn_at(curve, levels)};
+  } else if (curve.x.size() == 0) {  // within the run
+    Curve over_run = curve;
+    over_run.low = 0;
+    over_run.high = observations.duration_s.maxCoeff();
+    pieces = {drawn_at(over_run, places_to_draw({}, 0, over_run.high, false))};
   } else {
     const std::vector<double> seen = values_seen(curve, rows);
     const bool in_logarithm = has_waves(curve.shape) && is_of_logarithm(curve.shape);
     for (const Stretch& stretch : stretches_of(observations, rows, curve))
-      pieces.push_back(drawn_curve(curve, places_to_draw(seen, stretch.low, stretch.high, in_logarithm),
-                                   curve.low, curve.high));
+      pieces.push_back(drawn_at(curve, places_to_draw(seen, stretch.low, stretch.high, in_logarithm)));
   }
   for (std::vector<Drawn>& points : pieces) take_out_baseline(observations, rows, curve, points);
   return pieces;

@@ -53,8 +53,8 @@ void warn_of_doubts(Explanation& explanation) {
   if (explanation.noise_floor > explanation.after.held_out_high)
     explanation.warnings.emplace_back(
         "the noise floor is above all of the error's interval: the sealed blocks are calm by chance (in one "
-        "campaign of twenty-five without any fault), or the rows scatter less evenly than its variances can "
-        "follow, and it is too high");
+        "campaign of twenty-five without any fault), or it is too high, since the rows scatter less evenly "
+        "than its variances can follow, or curves are not known where these blocks are");
   else if (explanation.noise_floor > kFarAbove * error)  // whose interval reaches that far by a few rows
     explanation.warnings.push_back(fmt::format(
         "the noise floor is {:.2g} times the error: a stretch of open rows is far off, of which "

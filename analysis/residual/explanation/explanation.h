@@ -105,6 +105,9 @@ struct Explanation {
   std::string campaign, response, unit, baseline, verdict;
   /// " N", behind a number; nothing where the unit is 1 or not known.
   std::string unit_suffix() const { return unit.empty() || unit == "1" ? "" : " " + unit; }
+  /// Of a response that is held on logarithms, its mean size: what curves say is a part of it, drawn in its
+  /// unit. 0: not held like that.
+  double relative_to = 0;
   double noise_floor = 0;
   int blocks = 0, runs = 0;
   int model_in_force = 0;  // version that reduce goes by, while `baseline` is the thesis's

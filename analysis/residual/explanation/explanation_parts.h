@@ -81,7 +81,7 @@ void warn_of_doubts(Explanation& explanation);
 void warn_of_noisy_speed(const Observations& observations, const Eigen::MatrixXd& predicted,
                          Explanation& explanation);
 
-/// Effects whose amplitude within blocks is another than from one block to the next.
+/// Effects and curves whose amplitude within blocks is another than from one block to the next.
 void warn_of_blocks_of_their_own(const Observations& observations, const JointFit& fit,
                                  const std::vector<int>& rows, Explanation& explanation);
 

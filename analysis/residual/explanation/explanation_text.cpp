@@ -121,12 +121,15 @@ std::string could_be_in_words(const UnknownStructure& u) {
   return text;
 }
 
-std::string in_words(const UnknownStructure& u, const std::string& unit) {
+std::string in_words(const UnknownStructure& u, const Explanation& explanation) {
+  const std::string unit = explanation.unit_suffix();
+  const bool relative = explanation.relative_to > 0 && u.covariate != "session";
   const bool plain = u.covariate_unit.empty() || u.covariate_unit == "1";
-  std::string text =
-      fmt::format("\n  unknown: depends on {}{}{}{}, amplitude {:.3g}{}, p = {:.3g}\n", u.covariate,
-                  plain ? "" : " [" + u.covariate_unit + "]", u.times.empty() ? "" : " × " + u.times,
-                  u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit, u.p_value);
+  std::string text = fmt::format(
+      "\n  unknown: depends on {}{}{}{}, amplitude {:.3g}{}{}, p = {:.3g}\n", u.covariate,
+      plain ? "" : " [" + u.covariate_unit + "]", u.times.empty() ? "" : " × " + u.times,
+      u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit,
+      relative ? fmt::format(" ({:.3g} %)", 100 * u.amplitude / explanation.relative_to) : "", u.p_value);
   if (!u.place.empty()) text += fmt::format("    {}\n", place_in_words(u.place));
   if (!u.times.empty())
     text += fmt::format(
@@ -214,7 +217,7 @@ std::string explanation_text(const Explanation& e) {
                             e.model_in_force, e.baseline));
   text += fmt::format("\n{}: {}\n", e.verdict, verdict_in_words(e));
   for (const AdoptedEffect& adopted : e.adopted) text += in_words(adopted);
-  for (const UnknownStructure& unknown : e.unknown) text += in_words(unknown, e.unit_suffix());
+  for (const UnknownStructure& unknown : e.unknown) text += in_words(unknown, e);
   text += errors_in_words(e);
   if (e.verdict == "no_structure") text += detectable_in_words(e, e.unit_suffix());
   text += in_words(e.untestable);

@@ -150,6 +150,7 @@ Explanation begin_explanation(const Observations& observations) {
                           .unit = observations.unit,
                           .baseline = observations.baseline,
                           .verdict = {},
+                          .relative_to = observations.multiplicative ? observations.response_per_y() : 0,
                           .blocks = observations.blocks(),
                           .runs = static_cast<int>(observations.rows()),
                           .model = {}};

@@ -48,7 +48,7 @@ std::string unseen(const Observations& observations, const Covariate& covariate,
   if (!varies_within_groups(observations, covariate))
     return fmt::format("does not vary within any {}", table ? "group" : "location");
   if ((texts || (values == 2 && !named)) && levels_of(observations, covariate, rows).empty())
-    return "has fewer than two values that three blocks have, or more than twelve";
+    return "has fewer than two values that three open blocks have, or more than twelve";
   return "";
 }
 

@@ -1,8 +1,11 @@
-// Whether an effect does within blocks what it does from one block to the next.
+// Whether an effect, or a curve, does within blocks what it does from one block to the next.
 #include "analysis/residual/explanation/explanation_parts.h"
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -20,10 +23,10 @@ MatrixXd means_of_each(const std::vector<int>& belongs, const MatrixXd& values) 
   return result;
 }
 
-/// Whether a condition of the effect differs within blocks by more than rounding.
-bool differs_within_blocks(const Observations& observations, const Effect& effect) {
+/// Whether one of these conditions differs within blocks by more than rounding.
+bool differ_within_blocks(const Observations& observations, const std::vector<std::string>& names) {
   constexpr double kRounding = 1e-9;
-  return std::ranges::any_of(effect.covariates, [&](const std::string& name) {
+  return std::ranges::any_of(names, [&](const std::string& name) {
     const Covariate* covariate = observations.find(name);
     if (covariate == nullptr) return false;
     const MatrixXd& all = covariate->value;
@@ -35,57 +38,100 @@ bool differs_within_blocks(const Observations& observations, const Effect& effec
 /// Amplitudes of the parts of a column that blocks differ by, and that differs within them.
 struct TwoAmplitudes {
   double within = 0, between = 0, standard_error = 0;  // of their difference
+  double distance() const { return std::abs(within - between) / standard_error; }
 };
 
-/// `k`: the column of the fit, in place of which `between` and the rest of it are fitted.
-TwoAmplitudes apart(const Observations& observations, const JointFit& fit, std::size_t k,
-                    const MatrixXd& between, const std::vector<int>& rows) {
+/// Nothing where these differ by no more than three standard errors. What the fit's columns from `first` on,
+/// `count` of them, do is `made` times an amplitude, and is split up in their place.
+std::optional<TwoAmplitudes> apart(const Observations& observations, const JointFit& fit, std::size_t first,
+                                   std::size_t count, Components made, const std::vector<int>& rows) {
+  constexpr double kApart = 3, kRounding = 1e-12;
+  const bool of_courses =
+      std::any_of(made.begin() + 1, made.end(), [](const MatrixXd& own) { return !own.isZero(0); });
+  const MatrixXd between =
+      means_of_each(observations.block, made[0] - means_of_each(observations.group, made[0]));
+  if (of_courses || between.squaredNorm() < kRounding * made[0].squaredNorm()) return {};
   std::vector<Components> columns = fit.linear.columns;
-  columns.push_back(columns[k]);
-  columns[k][0] -= between;
+  const auto own = columns.begin() + static_cast<std::ptrdiff_t>(first);
+  columns.erase(own, own + static_cast<std::ptrdiff_t>(count));
+  columns.push_back(made);
+  columns.back()[0] -= between;
+  columns.push_back(std::move(made));
   columns.back()[0] = between;
   const Components y = difference(response_components(observations), fit.linear.offset);
   const AmplitudeFit both = fit_amplitudes(observations, y, columns, fit.variances, rows);
-  const MatrixXd& covariance = both.covariance;
-  const auto one = static_cast<Index>(k), two = both.amplitude.size() - 1;
-  return {both.amplitude(one), both.amplitude(two),
-          std::sqrt(std::max(0.0, covariance(one, one) + covariance(two, two) - 2 * covariance(one, two)))};
+  const Eigen::Vector2d of = both.amplitude.tail<2>();
+  const Eigen::Matrix2d covariance = both.covariance.bottomRightCorner<2, 2>();
+  const TwoAmplitudes result{of(0), of(1),
+                             std::sqrt(std::max(0.0, covariance.trace() - 2 * covariance(0, 1)))};
+  if (!(result.distance() > kApart)) return {};
+  return result;
+}
+
+/// What a curve's columns do together, which are those of the fit from `first` on.
+Components made_by(const Observations& observations, const JointFit& fit, std::size_t first,
+                   std::size_t count, const std::vector<int>& rows) {
+  const Components y = difference(response_components(observations), fit.linear.offset);
+  const Eigen::VectorXd amplitude =
+      fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows).amplitude;
+  Components made = fit.linear.columns[first];
+  for (MatrixXd& component : made) component *= amplitude(static_cast<Index>(first));
+  for (std::size_t k = first + 1; k < first + count; ++k)
+    for (std::size_t component = 0; component < made.size(); ++component)
+      made[component] += amplitude(static_cast<Index>(k)) * fit.linear.columns[k][component];
+  return made;
+}
+
+void warn_of_effects(const Observations& observations, const JointFit& fit, const std::vector<int>& rows,
+                     Explanation& explanation) {
+  const char* block = observations.from_table ? "block" : "session";
+  for (std::size_t t = 0; t < explanation.adopted.size(); ++t) {
+    const auto& places = fit.linear.of_parameters;
+    const auto place = std::ranges::find(places, ParameterPlace{t, 0});
+    const AdoptedEffect& adopted = explanation.adopted[t];
+    if (place == places.end() || is_at_bound(fit.model.terms[t], 0) ||
+        !differ_within_blocks(observations, adopted.term.effect->covariates))
+      continue;
+    const auto k = static_cast<std::size_t>(std::distance(places.begin(), place));
+    const auto of = apart(observations, fit, k, 1, fit.linear.columns[k], rows);
+    if (!of) continue;
+    const ParameterEstimate& amplitude = adopted.parameters[0];
+    const std::string unit = amplitude.unit == "1" ? "" : " " + amplitude.unit;
+    const double value = fit.model.terms[t].parameters[0];
+    explanation.warnings.push_back(fmt::format(
+        "{}: its {} is {:.3g}{} within {}s and {:.3g}{} from one to the next, {:.1f} standard errors apart: "
+        "its condition was read too coarsely to be followed within a {}, or something else changes with it",
+        adopted.term.label(), amplitude.name, value + of->within, unit, block, value + of->between, unit,
+        of->distance(), block));
+  }
+}
+
+void warn_of_curves(const Observations& observations, const JointFit& fit, const std::vector<int>& rows,
+                    Explanation& explanation) {
+  const char* block = observations.from_table ? "block" : "session";
+  std::size_t first = fit.linear.of_parameters.size();
+  for (const Curve& curve : fit.model.curves) {
+    const std::size_t own = first, count = curve.columns.size();
+    first += count;
+    if (curve.x.size() == 0 || curve.strength || !differ_within_blocks(observations, {curve.covariate}))
+      continue;
+    const auto of = apart(observations, fit, own, count, made_by(observations, fit, own, count, rows), rows);
+    if (!of) continue;
+    explanation.warnings.push_back(fmt::format(
+        "what goes with {}: within {}s it is {:.2g} times its curve and from one to the next {:.2g} times, "
+        "{:.1f} standard errors apart: doubt the curve's size and shape, since something else changes with "
+        "it",
+        curve.label(), block, of->within, of->between, of->distance()));
+  }
 }
 
 }  // namespace
 
 void warn_of_blocks_of_their_own(const Observations& observations, const JointFit& fit,
                                  const std::vector<int>& rows, Explanation& explanation) {
-  constexpr double kApart = 3;  // standard errors
-  constexpr double kRounding = 1e-12;
   if (observations.blocks_are_rows) return;
-  for (std::size_t t = 0; t < explanation.adopted.size(); ++t) {
-    const auto& places = fit.linear.of_parameters;
-    const auto place = std::ranges::find(places, ParameterPlace{t, 0});
-    const AdoptedEffect& adopted = explanation.adopted[t];
-    if (place == places.end() || is_at_bound(fit.model.terms[t], 0) ||
-        !differs_within_blocks(observations, *adopted.term.effect))
-      continue;
-    const auto k = static_cast<std::size_t>(std::distance(places.begin(), place));
-    const Components& column = fit.linear.columns[k];
-    const bool of_courses =
-        std::any_of(column.begin() + 1, column.end(), [](const MatrixXd& own) { return !own.isZero(0); });
-    const MatrixXd beside = column[0] - means_of_each(observations.group, column[0]);
-    const MatrixXd between = means_of_each(observations.block, beside);
-    const double all = column[0].squaredNorm();
-    if (of_courses || between.squaredNorm() < kRounding * all) continue;
-    const TwoAmplitudes of = apart(observations, fit, k, between, rows);
-    if (!(std::abs(of.within - of.between) > kApart * of.standard_error)) continue;
-    const ParameterEstimate& amplitude = adopted.parameters[0];
-    const std::string unit = amplitude.unit == "1" ? "" : " " + amplitude.unit;
-    const double value = fit.model.terms[t].parameters[0];
-    const char* block = observations.from_table ? "block" : "session";
-    explanation.warnings.push_back(fmt::format(
-        "{}: its {} is {:.3g}{} within {}s and {:.3g}{} from one to the next, {:.1f} standard errors apart: "
-        "its condition was read too coarsely to be followed within a {}, or something else changes with it",
-        adopted.term.label(), amplitude.name, value + of.within, unit, block, value + of.between, unit,
-        std::abs(of.within - of.between) / of.standard_error, block));
-  }
+  warn_of_effects(observations, fit, rows, explanation);
+  warn_of_curves(observations, fit, rows, explanation);
 }
 
 }  // namespace tunnelrig

@@ -279,6 +279,20 @@ void set_previous(Observations& result) {
   }
 }
 
+/// What a quantity is called here need not be the header's name for it.
+void require_column(const TableSource& source, const std::string& baseline, const std::string& column) {
+  const TableSchema& schema = source.table.schema;
+  const auto means_it = [&](const TableColumn& described) { return described.meaning == column; };
+  const auto covariate = std::ranges::find_if(schema.covariates, means_it);
+  const std::string header = column == "speed_rpm" && schema.speed_column ? *schema.speed_column
+                             : covariate != schema.covariates.end()       ? covariate->column
+                                                                          : "";
+  if (!source.table.sheet.find(column) && !header.empty())
+    throw InputError(
+        fmt::format("--baseline {}: COLUMN is the header's name, which is {}", baseline, header));
+  source.table.sheet.require(column);
+}
+
 /// constant, linear:COLUMN or power:COLUMN, the slope each group's own.
 void set_baseline(const TableSource& source, const ObservationChoice& choice, Observations& result) {
   result.baseline = choice.baseline.empty() ? kConstantBaseline : choice.baseline;
@@ -289,7 +303,7 @@ void set_baseline(const TableSource& source, const ObservationChoice& choice, Ob
     throw InputError(
         fmt::format("--baseline {}: a table has constant, linear:COLUMN and power:COLUMN", choice.baseline));
   const std::string column = result.baseline.substr(colon + 1);
-  source.table.sheet.require(column);
+  require_column(source, choice.baseline, column);
   if (kind == "linear" && result.multiplicative) {  // a straight line is no power law: additive
     result.multiplicative = false;
     result.y = result.value = (result.value.array() * result.sign.replicate(1, result.value.cols()).array());

@@ -104,7 +104,7 @@ TEST_F(ExplainTest, AValueThatTwoBlocksHaveIsNotToldFromTheirScatter) {
   o.covariates.push_back(fan);
   for (const Curve& curve : curves_to_try(o, o.all_rows())) EXPECT_NE(curve.covariate, "fan_on");
   EXPECT_THAT(explained(o).warnings,
-              Contains(HasSubstr("fan_on has fewer than two values that three blocks have")));
+              Contains(HasSubstr("fan_on has fewer than two values that three open blocks have")));
 }
 
 TEST_F(ExplainTest, AConditionThatOnlyLocationsDifferByIsSaid) {
