@@ -60,13 +60,12 @@ void warn_of_blocks_of_their_own(const Observations& observations, const JointFi
   constexpr double kRounding = 1e-12;
   if (observations.blocks_are_rows) return;
   for (std::size_t t = 0; t < explanation.adopted.size(); ++t) {
-    const auto& places = fit.linear.of_parameters;
-    const auto place = std::ranges::find(places, ParameterPlace{t, 0});
+    const std::optional<Index> place = fit.linear.column_of({t, 0});
     const AdoptedEffect& adopted = explanation.adopted[t];
-    if (place == places.end() || is_at_bound(fit.model.terms[t], 0) ||
+    if (!place || is_at_bound(fit.model.terms[t], 0) ||
         !differs_within_blocks(observations, *adopted.term.effect))
       continue;
-    const auto k = static_cast<std::size_t>(std::distance(places.begin(), place));
+    const auto k = static_cast<std::size_t>(*place);
     const Components& column = fit.linear.columns[k];
     const bool of_courses =
         std::any_of(column.begin() + 1, column.end(), [](const MatrixXd& own) { return !own.isZero(0); });
