@@ -62,30 +62,9 @@ double jackknife_dof(const Observations& observations, const Explanation& explan
   return std::max(1.0, static_cast<double>(folds) - 1);
 }
 
-/// The explanation's model fitted jointly: amplitudes of its curves, covariance of all its columns, and whose
-/// columns they are.
-struct Joint {
-  AmplitudeFit fit;
-  std::vector<ParameterPlace> of_parameters;
-
-  /// Of a parameter; −1: it is no column of the fit, being known, a change-point, or a shape at its bound.
-  Index column(const ParameterPlace& place) const {
-    const auto found = std::find(of_parameters.begin(), of_parameters.end(), place);
-    return found == of_parameters.end() ? -1 : std::distance(of_parameters.begin(), found);
-  }
-};
-
-Joint joint_fit_of(const Observations& observations, const Explanation& explanation) {
-  const std::vector<int> rows = observations.all_rows();
-  const JointFit fit = fit_jointly(observations, explanation.model, rows);
-  const Components y = difference(response_components(observations), fit.linear.offset);
-  return {fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows), fit.linear.of_parameters};
-}
-
-/// Where a parameter of the model stands among the joint fit's columns (−1: nowhere), and how far it is
-/// known.
+/// Where a parameter of the model stands among the joint fit's columns, if it does, and how far it is known.
 struct Placed {
-  Index column;
+  std::optional<Index> column;
   double uncertainty;
   std::size_t term;                // whose it is; of a curve, which has no deviations, nothing
   std::vector<double> deviations;  // of the jackknife
@@ -97,9 +76,9 @@ double covariance_of_two(const Placed& one, const Placed& two, const MatrixXd& c
   if (one.uncertainty == 0 || two.uncertainty == 0) return 0;
   if (one.term == two.term && !one.deviations.empty() && one.deviations.size() == two.deviations.size())
     return std::inner_product(one.deviations.begin(), one.deviations.end(), two.deviations.begin(), 0.0);
-  if (one.column < 0 || two.column < 0) return 0;
-  const double correlation = columns(one.column, two.column) /
-                             std::sqrt(columns(one.column, one.column) * columns(two.column, two.column));
+  if (!one.column || !two.column) return 0;
+  const Index i = *one.column, j = *two.column;
+  const double correlation = columns(i, j) / std::sqrt(columns(i, i) * columns(j, j));
   if (!std::isfinite(correlation)) return 0;
   return one.uncertainty * two.uncertainty * std::clamp(correlation, -1.0, 1.0);
 }
@@ -151,14 +130,18 @@ Adoption adopt(const Observations& observations, const Explanation& explanation,
       result.notes.emplace_back("what was found has no name; --adopt-empirical adopts it as a curve");
     return result;
   }
-  const Joint joint = joint_fit_of(observations, explanation);
-  const AmplitudeFit& fit = joint.fit;
+  const std::vector<int> rows = observations.all_rows();
+  const JointFit joint = fit_jointly(observations, explanation.model, rows);
+  const LinearModel& linear = joint.linear;
+  const AmplitudeFit fit =
+      fit_amplitudes(observations, difference(response_components(observations), linear.offset),
+                     linear.columns, joint.variances, rows);
   std::vector<Placed> placed;
   for (const AdoptedEffect& adopted : explanation.adopted) {
     model.terms.push_back(model_term(adopted, observations));
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k) {
-      const Index column = joint.column({model.terms.size() - 1, k});
-      const bool uncertain = column >= 0 || adopted.term.effect->parameters[k].role == ParameterRole::kShape;
+      const std::optional<Index> column = linear.column_of({model.terms.size() - 1, k});
+      const bool uncertain = column || adopted.term.effect->parameters[k].role == ParameterRole::kShape;
       placed.push_back({column, uncertain ? adopted.parameters[k].standard_error : 0, model.terms.size(),
                         adopted.parameters[k].deviations});
     }
@@ -166,7 +149,7 @@ Adoption adopt(const Observations& observations, const Explanation& explanation,
       result.notes.push_back(fmt::format("{} is adopted, and these data cannot tell it from {}",
                                          adopted.term.label(), fmt::join(adopted.confounded_with, ", ")));
   }
-  Index column = std::ssize(joint.of_parameters);
+  Index column = std::ssize(linear.of_parameters);
   for (const Curve& curve : explanation.model.curves) {
     const auto bends = static_cast<Index>(curve.columns.size());
     if (curves_wanted && acts_on_means(curve)) {

@@ -61,8 +61,7 @@ double residuals_of_floor(const Observations& observations, const JointFit& fit,
 JointFit without_curves(JointFit fit, const Observations& observations, const std::vector<int>& rows) {
   fit.model.curves.clear();
   fit.linear = linearise(observations, fit.model, predict_forces(observations, fit.model, rows));
-  fit.linear.columns.clear();
-  fit.linear.of_parameters.clear();
+  fit.linear.clear_columns();
   fit.variances = CandidateScan(MixedModel(observations, rows), {}, {})
                       .null_fit(difference(response_components(observations), fit.linear.offset));
   return fit;

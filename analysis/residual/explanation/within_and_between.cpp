@@ -86,13 +86,12 @@ void warn_of_effects(const Observations& observations, const JointFit& fit, cons
                      Explanation& explanation) {
   const char* block = observations.from_table ? "block" : "session";
   for (std::size_t t = 0; t < explanation.adopted.size(); ++t) {
-    const auto& places = fit.linear.of_parameters;
-    const auto place = std::ranges::find(places, ParameterPlace{t, 0});
+    const std::optional<Index> place = fit.linear.column_of({t, 0});
     const AdoptedEffect& adopted = explanation.adopted[t];
-    if (place == places.end() || is_at_bound(fit.model.terms[t], 0) ||
+    if (!place || is_at_bound(fit.model.terms[t], 0) ||
         !differ_within_blocks(observations, adopted.term.effect->covariates))
       continue;
-    const auto k = static_cast<std::size_t>(std::distance(places.begin(), place));
+    const auto k = static_cast<std::size_t>(*place);
     const auto of = apart(observations, fit, k, 1, fit.linear.columns[k], rows);
     if (!of) continue;
     const ParameterEstimate& amplitude = adopted.parameters[0];

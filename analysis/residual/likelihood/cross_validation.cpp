@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 
 namespace tunnelrig {
@@ -39,17 +38,6 @@ CrossValidation cross_validate(const Observations& observations, const Component
   for (const Fold& fold : leave_out_blocks(observations, rows))
     result.folds.push_back(predict_held_out(observations, y, columns, null, fold.kept, fold.left_out));
   return result;
-}
-
-double CrossValidation::rmse() const {
-  double squares = 0;
-  Index count = 0;
-  for (const HeldOutErrors& fold : folds) {
-    squares += fold.sum_of_squares();
-    count += fold.count();
-  }
-  return count == 0 ? std::numeric_limits<double>::quiet_NaN()
-                    : std::sqrt(squares / static_cast<double>(count));
 }
 
 HeldOutErrors CrossValidation::all() const {
@@ -90,13 +78,16 @@ LossDifference compare(const CrossValidation& worse, const CrossValidation& bett
 }
 
 double rmse_gain(const CrossValidation& worse, const CrossValidation& better) {
-  CrossValidation of_worse, of_better;
+  double of_worse = 0, of_better = 0;  // sums of squares
+  Index count = 0;
   for (std::size_t fold = 0; fold < worse.folds.size(); ++fold) {
     if (!score_the_same_runs(worse.folds[fold], better.folds[fold])) continue;
-    of_worse.folds.push_back(worse.folds[fold]);
-    of_better.folds.push_back(better.folds[fold]);
+    of_worse += worse.folds[fold].sum_of_squares();
+    of_better += better.folds[fold].sum_of_squares();
+    count += worse.folds[fold].count();  // the same of both
   }
-  const double gain = of_worse.rmse() - of_better.rmse();
+  if (count == 0) return 0;
+  const double n = static_cast<double>(count), gain = std::sqrt(of_worse / n) - std::sqrt(of_better / n);
   return std::isfinite(gain) ? gain : 0;
 }
 

@@ -19,7 +19,6 @@ std::vector<Fold> leave_out_blocks(const Observations& observations, const std::
 struct CrossValidation {
   std::vector<HeldOutErrors> folds;
 
-  double rmse() const;
   HeldOutErrors all() const;       // rows, errors and what these are expected to be, of all folds
   Eigen::VectorXd losses() const;  // of the folds
 };

@@ -270,6 +270,14 @@ AmplitudeFit fit_amplitudes(const Observations& observations, const Components& 
   return {fit.amplitude, fit.covariance, fit.equations.a};
 }
 
+Components left_beside(const Observations& observations, Components y, const std::vector<Components>& columns,
+                       const NullFit& null, const std::vector<int>& rows) {
+  const VectorXd amplitude = fit_amplitudes(observations, y, columns, null, rows).amplitude;
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    for (std::size_t k = 0; k < y.size(); ++k) y[k] -= amplitude(static_cast<Index>(c)) * columns[c][k];
+  return y;
+}
+
 HeldOutErrors predict_held_out(const Observations& observations, const Components& y,
                                const std::vector<Components>& columns, const NullFit& null,
                                const std::vector<int>& fit_rows, const std::vector<int>& test_rows) {

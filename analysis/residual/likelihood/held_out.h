@@ -33,6 +33,10 @@ AmplitudeFit fit_amplitudes(const Observations& observations, const Components& 
                             const std::vector<Components>& columns, const NullFit& null,
                             const std::vector<int>& rows);
 
+/// y less the columns at these amplitudes, the baseline still in it.
+Components left_beside(const Observations& observations, Components y, const std::vector<Components>& columns,
+                       const NullFit& null, const std::vector<int>& rows);
+
 /// Fits group constants and the columns' amplitudes to y of `fit_rows` by generalised least squares with the
 /// variances of `null`, then predicts `test_rows`. Where a test run's group was not seen but the groups lie
 /// within blocks, the group's constant comes from every other run of it and the errors from the rest.

@@ -182,6 +182,17 @@ MeanModel MeanModel::without_term(std::size_t t) const {
   return rest;
 }
 
+std::optional<Index> LinearModel::column_of(const ParameterPlace& place) const {
+  const auto found = std::ranges::find(of_parameters, place);
+  if (found == of_parameters.end()) return std::nullopt;
+  return std::distance(of_parameters.begin(), found);
+}
+
+void LinearModel::clear_columns() {
+  columns.clear();
+  of_parameters.clear();
+}
+
 Components response_components(const Observations& observations) {
   Components result = {observations.y};
   result.insert(result.end(), observations.shape.begin(), observations.shape.end());
@@ -192,12 +203,6 @@ Components difference(const Components& a, const Components& b) {
   Components result = a;
   for (std::size_t k = 0; k < result.size(); ++k) result[k] -= b[k];
   return result;
-}
-
-Components without(Components y, const std::vector<Components>& columns, const Eigen::VectorXd& amplitude) {
-  for (std::size_t c = 0; c < columns.size(); ++c)
-    for (std::size_t k = 0; k < y.size(); ++k) y[k] -= amplitude(static_cast<Index>(c)) * columns[c][k];
-  return y;
 }
 
 namespace {

@@ -31,6 +31,11 @@ struct LinearModel {
   Components offset;                // what the terms add to y
   std::vector<Components> columns;  // derivatives by the terms' free parameters, then the curves' columns
   std::vector<ParameterPlace> of_parameters = {};  // whose the first columns are
+
+  /// Of a parameter; nothing where it has none: it is known, a change-point, or a shape at its bound.
+  std::optional<Eigen::Index> column_of(const ParameterPlace& place) const;
+  /// Leaves what the terms add: nothing is free any more.
+  void clear_columns();
 };
 
 /// Forces (responses), n × c each.
@@ -51,8 +56,6 @@ Eigen::MatrixXd predict_response(const Observations& observations, const MeanMod
 /// y of the observations, as components.
 Components response_components(const Observations& observations);
 Components difference(const Components& a, const Components& b);
-/// y less columns times their amplitudes.
-Components without(Components y, const std::vector<Components>& columns, const Eigen::VectorXd& amplitude);
 
 /// Which shapes of the terms have columns: one that has come to a bound is fitted by none.
 enum class Shapes { kWithinBounds, kAll };

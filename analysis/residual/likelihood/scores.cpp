@@ -20,10 +20,7 @@ LinearModel at_own_forces(const Observations& observations, const JointFit& fit,
     for (const Index place : own.fitted) rows.push_back(test_rows[static_cast<std::size_t>(place)]);
   if (fit.model.terms.empty() || rows.size() == fit_rows.size()) return fit.linear;
   LinearModel linear = linearise(observations, fit.model, predict_forces(observations, fit.model, rows));
-  if (fit.linear.columns.empty()) {  // the fit's amplitudes are not asked for again
-    linear.columns.clear();
-    linear.of_parameters.clear();
-  }
+  if (fit.linear.columns.empty()) linear.clear_columns();  // the fit's amplitudes are not asked for again
   return linear;
 }
 

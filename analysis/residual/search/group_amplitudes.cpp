@@ -169,8 +169,7 @@ std::vector<GroupEstimate> estimate_by_group(const Observations& observations, c
   const Index column = observations.first_own_slope() + place_among_own(model, t);
   const LinearModel linear = linearise(observations, model, predict_forces(observations, model, rows));
   const Components y = difference(response_components(observations), linear.offset);
-  const VectorXd curves = fit_amplitudes(observations, y, linear.columns, variances, rows).amplitude;
-  const VectorXd left_of_y = without(y, linear.columns, curves)[0].col(0);
+  const VectorXd left_of_y = left_beside(observations, y, linear.columns, variances, rows)[0].col(0);
   std::vector<GroupEstimate> result;
   for (const auto& [group, own] : rows_of_each(observations.group, rows)) {
     const Index n = static_cast<Index>(own.size()), k = observations.slopes.cols();

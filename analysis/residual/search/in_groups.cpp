@@ -60,10 +60,8 @@ InGroups at_best_values(InGroups own, const std::vector<int>& rows) {
 std::pair<double, double> sum_of_squares(const SearchData& data, const Observations& observations,
                                          const JointFit& fit, const NullFit& variances) {
   const MixedModel mixed(observations, data.rows(), variances.ratio);
-  const Components y = difference(data.y(), fit.linear.offset);
-  const Components left =
-      without(y, fit.linear.columns,
-              fit_amplitudes(observations, y, fit.linear.columns, variances, data.rows()).amplitude);
+  const Components left = left_beside(observations, difference(data.y(), fit.linear.offset),
+                                      fit.linear.columns, variances, data.rows());
   Stacked stacked = mixed.stack(0, {&left});
   mixed.project(0, variances.ratio[0], stacked);
   const double dof = static_cast<double>(mixed.dof(0) - static_cast<Index>(fit.linear.columns.size()));

@@ -170,15 +170,15 @@ std::optional<RunScatter> other_scatter_beside(const SearchData& data, const Fou
   const Components y = difference(data.y(), found.fit.linear.offset);
   Observations scattered = data.observations();
   RunScatter& scatter = scattered.scatter = {.by_condition = beside.scatter.by_condition};
-  const auto left_beside = [&](const std::vector<Components>& of) {
-    return without(y, of, fit_amplitudes(scattered, y, of, beside.scatter.variances, data.rows()).amplitude);
+  const auto left = [&](const std::vector<Components>& of) {
+    return left_beside(scattered, y, of, beside.scatter.variances, data.rows());
   };
-  const Components residual = left_beside(columns);
+  const Components residual = left(columns);
   // What a condition does to single rotors, or to them in pairs, is no scatter.
   std::vector<Components> with_each_rotor = columns;
   for (const Curve& curve : of_each_rotor(curves))
     with_each_rotor.insert(with_each_rotor.end(), curve.columns.begin(), curve.columns.end());
-  const Components of_rotors = left_beside(with_each_rotor);
+  const Components of_rotors = left(with_each_rotor);
   // Rotors that scatter in pairs are not told from such as scatter alone by each one's own scatter.
   const bool differ = rotors_differ(of_rotors, data.rows());
   const Eigen::VectorXd contrasts =
@@ -191,8 +191,7 @@ std::optional<RunScatter> other_scatter_beside(const SearchData& data, const Fou
   scatter.runs = run_scatter(data.observations(), run_sizes(model, variances, y, columns, for_runs));
   // The best of many curves makes half of what a dozen sessions differ by, whatever that is.
   if (differ && contrasts.size() == 0)
-    scatter.sessions =
-        rotor_sessions(scattered, data.rows(), left_beside(found.fit.linear.columns), for_sessions);
+    scatter.sessions = rotor_sessions(scattered, data.rows(), left(found.fit.linear.columns), for_sessions);
   scatter.contrasts = contrasts;  // after what takes the differences for one stratum
   if (are_alike(scatter.rotors, before.rotors) && are_alike(contrasts, before.contrasts) &&
       scatter.sessions.rotors == before.sessions.rotors &&

@@ -137,11 +137,9 @@ double p_of_units(const SearchData& data, const VectorXd& left, const Curve& pro
 
 /// What the fit leaves of the runs, of all rotors together, beside the baseline.
 VectorXd left_by(const SearchData& data, const JointFit& fit) {
-  Components y = difference(data.y(), fit.linear.offset);
-  const VectorXd amplitude =
-      fit_amplitudes(data.observations(), y, fit.linear.columns, fit.variances, data.rows()).amplitude;
-  y = without(std::move(y), fit.linear.columns, amplitude);
-  Stacked left = data.baseline().stack(0, {&y});
+  const Components of_rotors = left_beside(data.observations(), difference(data.y(), fit.linear.offset),
+                                           fit.linear.columns, fit.variances, data.rows());
+  Stacked left = data.baseline().stack(0, {&of_rotors});
   data.baseline().project(0, 0, left);
   return left.col(0).head(std::ssize(data.rows()));
 }
