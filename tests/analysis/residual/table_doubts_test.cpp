@@ -148,13 +148,19 @@ TEST_F(TableDoubts, WhatOneBlockAloneShowsIsNoDependence) {
                               "blocks = \"day\"\n[response]\ncolumn = \"y\"\nunit = \"1\"\n"
                               "[[covariates]]\ncolumn = \"level\"\nunit = \"1\"\n"));
   };
-  const auto of_one = HasSubstr("block 7 alone shows that the response goes with level");
-  const Explanation one = of(1), three = of(3);
-  EXPECT_THAT(one.unknown, testing::IsEmpty()) << explanation_text(one);
-  EXPECT_THAT(one.warnings, Contains(of_one)) << explanation_text(one);
-  ASSERT_EQ(three.unknown.size(), 1u) << explanation_text(three);
-  EXPECT_EQ(three.unknown[0].covariate, "level");
-  EXPECT_THAT(three.warnings, Not(Contains(HasSubstr("alone shows"))));
+  constexpr int kTables = 12;
+  int claimed = 0, said = 0;  // the others show it by chance once in twenty
+  for (int k = 0; k < kTables; ++k) {
+    const Explanation one = of(1), three = of(3);
+    claimed += !one.unknown.empty();
+    said += testing::Matches(Contains(HasSubstr("block 7 alone shows that the response goes with level")))(
+        one.warnings);
+    ASSERT_EQ(three.unknown.size(), 1u) << explanation_text(three);
+    EXPECT_EQ(three.unknown[0].covariate, "level");
+    EXPECT_THAT(three.warnings, Not(Contains(HasSubstr("alone shows"))));
+  }
+  EXPECT_LE(claimed, 3);
+  EXPECT_GE(said, kTables - 4);
 }
 
 }  // namespace

@@ -54,6 +54,44 @@ TEST_F(UnknownSizeTest, ACurveIsDrawnWhereThereAreRows) {
     EXPECT_TRUE(point.x == 21 || point.x == 22 || point.x == 64) << point.x;
 }
 
+/// One row far from the others says nothing of what is between.
+TEST_F(UnknownSizeTest, ACurveIsNotDrawnIntoAGap) {
+  std::string csv = "day,T,u\n";
+  for (int r = 0; r < 240; ++r) {
+    const double celsius = r == 77 ? 80 : 20 + 10 * even(random);
+    csv += fmt::format("{},{},{}\n", r / 15, celsius,
+                       20 + std::sin(celsius / 10 * 2 * 3.14159) + 0.1 * scatter(random));
+  }
+  const Explanation e = explained(observed(csv,
+                                           "blocks = \"day\"\n[response]\ncolumn = \"u\"\nunit = \"1\"\n"
+                                           "[[covariates]]\ncolumn = \"T\"\n"));
+  ASSERT_EQ(e.unknown.size(), 1u) << explanation_text(e);
+  for (const ShapePoint& point : e.unknown[0].shape) EXPECT_TRUE(point.x < 32 || point.x > 79) << point.x;
+}
+
+/// The straight part of few values is the baseline's, and so is what is not known of it.
+TEST_F(UnknownSizeTest, FewValuesOverTheBaselinesOwnColumnAreBesideItsLine) {
+  std::string csv = "file,x,u\n";
+  for (int file = 0; file < 12; ++file) {
+    const double slope = 2 + 0.5 * scatter(random), constant = scatter(random);
+    for (int k = 0; k < 14; ++k)
+      csv += fmt::format("{},{},{}\n", file, k % 7 + 1,
+                         constant + slope * (k % 7) + 0.3 * (k % 7 % 2) + 0.05 * scatter(random));
+  }
+  const Explanation e = explained(observed(csv,
+                                           "groups = [\"file\"]\nblocks = \"file\"\n[response]\ncolumn = "
+                                           "\"u\"\nunit = \"1\"\n[[covariates]]\ncolumn = \"x\"\n",
+                                           "linear:x"));
+  ASSERT_EQ(e.unknown.size(), 1u) << explanation_text(e);
+  const auto& shape = e.unknown[0].shape;
+  ASSERT_TRUE(e.unknown[0].levels);
+  ASSERT_EQ(shape.size(), 7u);
+  for (const ShapePoint& point : shape) {
+    EXPECT_NEAR(point.y, (std::lround(point.x) % 2 == 0 ? 0.3 : 0) - 0.9 / 7, 0.06) << point.x;
+    EXPECT_LT(point.high - point.low, 0.12) << point.x;
+  }
+}
+
 /// What one rotor clips, where others clip far more.
 TEST_F(UnknownSizeTest, ACurveOfOneRotorIsDrawnOverItsOwnRange) {
   Observations o = test::simulate(

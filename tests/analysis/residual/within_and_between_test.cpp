@@ -4,6 +4,8 @@
 #include "support/seeds.h"
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 
 #include <gmock/gmock.h>
 
@@ -54,6 +56,43 @@ TEST(WithinAndBetween, AConditionThatIsReadTooCoarselyIsSaid) {
   EXPECT_LE(of_exact, 1);
   EXPECT_GE(named, 6);
   EXPECT_GE(of_coarse, named - 2);
+}
+
+/// Sessions that differ in a condition of no name, of which `share` is taken back by what else they differ
+/// in.
+Explanation of_a_bend(double share, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  Observations o = test::simulate({.runs_of_block = std::vector<int>(18, 12), .session_ratio = 0.4}, random);
+  VectorXd level(o.rows()), made(o.rows());
+  double of_session = 0;
+  for (Index row = 0; row < o.rows(); ++row) {
+    if (row % 12 == 0) of_session = normal(random);
+    level(row) = of_session + normal(random);
+    made(row) = 0.02 * (std::cos(1.5 * level(row)) - share * std::cos(1.5 * of_session));
+  }
+  test::set_y(o, o.y.colwise() + made);
+  o.covariates.push_back({"level", level});
+  return test::explained(o);
+}
+
+TEST(WithinAndBetween, ACurveThatSomethingElseTakesBackIsDoubted) {
+  constexpr int kCampaigns = 12;
+  std::mt19937_64 random(test::seed());
+  const auto says = [](const Explanation& e) {
+    return std::ranges::any_of(e.warnings, [](const std::string& warning) {
+      return warning.starts_with("what goes with level: within sessions it is ");
+    });
+  };
+  int of_right = 0, of_taken_back = 0, seen = 0;
+  for (int k = 0; k < kCampaigns; ++k) {
+    of_right += says(of_a_bend(0, random));
+    const Explanation e = of_a_bend(3, random);
+    seen += !e.unknown.empty();
+    of_taken_back += says(e);
+  }
+  EXPECT_LE(of_right, 1);
+  EXPECT_GE(seen, 8);
+  EXPECT_GE(of_taken_back, seen / 2);
 }
 
 }  // namespace
