@@ -254,15 +254,18 @@ void warn_of_single_blocks(const Observations& observations, const std::vector<O
       return unknown.condition == each.covariate && unknown.rotor == each.rotor;
     };
     std::vector<std::string>& names = over[each.block];
-    const bool said = std::ranges::count(names, each.covariate) > 0;
-    if (!said && std::ranges::none_of(explanation.unknown, is_it)) names.push_back(each.covariate);
+    const std::string name =
+        each.covariate + (each.rotor < 0 ? "" : fmt::format(" of rotor {}", each.rotor + 1));
+    const bool said = std::ranges::count(names, name) > 0;
+    if (!said && std::ranges::none_of(explanation.unknown, is_it)) names.push_back(name);
   }
   for (const auto& [block, names] : over) {
     if (names.empty()) continue;
     explanation.warnings.push_back(fmt::format(
-        "block {} alone shows that the response goes with {}, and the others say nothing of it: it may be "
-        "something else that was special there, so it is no dependence here; the same conditions in other "
-        "blocks would tell",
+        "{0} {1} alone shows that the response goes with {2}, and the others say nothing of it: a "
+        "dependence is not told from whatever else was special there; the same conditions in another {0} "
+        "would tell",
+        observations.from_table ? "block" : "session",
         observations.block_name[static_cast<std::size_t>(block)], first_few(names, kNamed)));
   }
 }

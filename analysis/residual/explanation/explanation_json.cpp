@@ -82,6 +82,7 @@ std::string explanation_json(const Explanation& e) {
             {"unit", e.unit},
             {"baseline", e.baseline},
             {"verdict", e.verdict},
+            {"relative_to", finite(e.relative_to)},
             {"noise_floor", finite(e.noise_floor)},
             {"seal_chose", e.seal_chose},
             {"blocks", e.blocks},

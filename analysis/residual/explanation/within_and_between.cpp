@@ -38,7 +38,7 @@ bool differ_within_blocks(const Observations& observations, const std::vector<st
 /// Amplitudes of the parts of a column that blocks differ by, and that differs within them.
 struct TwoAmplitudes {
   double within = 0, between = 0, standard_error = 0;  // of their difference
-  double distance() const { return std::abs(within - between) / standard_error; }
+  double distance() const { return standard_error > 0 ? std::abs(within - between) / standard_error : 0; }
 };
 
 /// Nothing where these differ by no more than three standard errors. What the fit's columns from `first` on,

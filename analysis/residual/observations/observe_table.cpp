@@ -287,7 +287,7 @@ void require_column(const TableSource& source, const std::string& baseline, cons
   const std::string header = column == "speed_rpm" && schema.speed_column ? *schema.speed_column
                              : covariate != schema.covariates.end()       ? covariate->column
                                                                           : "";
-  if (!source.table.sheet.find(column) && !header.empty())
+  if (!column.empty() && !source.table.sheet.find(column) && !header.empty())
     throw InputError(
         fmt::format("--baseline {}: COLUMN is the header's name, which is {}", baseline, header));
   source.table.sheet.require(column);

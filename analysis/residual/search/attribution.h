@@ -87,7 +87,7 @@ struct Attribution {
   std::vector<Accepted> accepted;
   std::vector<FoundCurve> curves;
   std::vector<BeyondBounds> beyond_bounds;
-  std::vector<OfOneBlock> of_one_block;  // of each covariate and rotor once
+  std::vector<OfOneBlock> of_one_block;
   std::optional<SessionScatter> session_unknown = {};
   JointFit baseline, final;   // without and with the accepted terms and curves
   Observations observations;  // what `final` speaks of: with a group's own amplitudes among its baseline

@@ -75,19 +75,38 @@ Curve best_of(const std::vector<Curve>& forms, const SearchData& data, const Joi
   return forms[best];
 }
 
-/// Whether one block alone shows it, which is recorded, and said of the round.
-bool is_of_one_block(SearchState& state, const Curve& curve) {
-  const std::optional<int> block = block_that_alone_shows(state.data, state.found.fit, curve);
-  if (!block) return false;
-  const auto is_said = [&](const OfOneBlock& other) {
-    return other.covariate == curve.covariate && other.rotor == curve.rotor;
-  };
-  if (std::ranges::any_of(state.record.of_one_block, is_said)) return true;
-  state.record.of_one_block.push_back({curve.covariate, curve.rotor, *block});
-  state.record.curve_rounds.back().outcome +=
-      fmt::format("; {} by block {} alone", curve.label(),
-                  state.data.observations().block_name[static_cast<std::size_t>(*block)]);
-  return true;
+struct Chosen {
+  std::size_t curve;  // of those that were tried
+  double p;
+};
+
+/// The curve to add: the best of a scan; where one block alone shows that, the best without this block, if it
+/// is beyond chance there as well. What is not is recorded.
+std::optional<Chosen> choose(SearchState& state, const CurveScan& curves, NullMaxima& maxima) {
+  const auto& [scan, tried] = curves;
+  const double alpha = state.data.settings().alpha;
+  const Chosen best{scan.order[0], maxima.p(scan.fits[scan.order[0]].evidence)};
+  Round& round = state.record.curve_rounds.back();
+  round.outcome = fmt::format("p = {:.3g} for {}", best.p, tried[best.curve].label());
+  if (best.p > alpha) return {};
+  const std::optional<int> block =
+      block_that_alone_shows(state.data, state.found.fit, tried[best.curve].columns);
+  if (!block) return best;
+  const auto without = fits_without(state.data, state.found.fit, *block, scan.candidates);
+  std::optional<Chosen> other;
+  for (std::size_t i = 0; i < tried.size(); ++i) {
+    if (maxima.p(scan.fits[i].evidence) > alpha) continue;
+    const double p = maxima.p(without[i].evidence);
+    if (p > alpha)
+      state.record.of_one_block.push_back({tried[i].covariate, tried[i].rotor, *block});
+    else if (!other || without[i].evidence > without[other->curve].evidence)
+      other = Chosen{i, p};
+  }
+  round.outcome += fmt::format(", by block {} alone",
+                               state.data.observations().block_name[static_cast<std::size_t>(*block)]);
+  if (other)
+    round.outcome += fmt::format("; without it p = {:.3g} for {}", other->p, tried[other->curve].label());
+  return other;
 }
 
 }  // namespace
@@ -109,20 +128,13 @@ bool add_best_curve(SearchState& state, const CurveScan& curves) {
   const auto& [scan, tried] = curves;
   if (tried.empty()) return false;
   NullMaxima maxima = state.questions.maxima_of(state.data, state.found.fit, scan, Draws::kCurves);
-  const double p_best = maxima.p(scan.fits[scan.order[0]].evidence);
-  Round round;
-  round.observed = scan.fits[scan.order[0]].evidence;
-  round.null_maxima = maxima.values();
-  round.outcome = fmt::format("p = {:.3g} for {}", p_best, tried[scan.order[0]].label());
-  state.record.curve_rounds.push_back(std::move(round));
-  for (const std::size_t i : scan.order) {
-    const double p = maxima.p(scan.fits[i].evidence);
-    if (p > state.data.settings().alpha) return false;
-    if (is_of_one_block(state, tried[i])) continue;
-    add_curve(state.data, state.found, tried[everywhere_instead(state.data, state.found.fit, curves, i)], p);
-    return true;
-  }
-  return false;
+  state.record.curve_rounds.emplace_back().observed = scan.fits[scan.order[0]].evidence;
+  const std::optional<Chosen> chosen = choose(state, curves, maxima);
+  state.record.curve_rounds.back().null_maxima = maxima.values();
+  if (!chosen) return false;
+  const std::size_t curve = everywhere_instead(state.data, state.found.fit, curves, chosen->curve);
+  add_curve(state.data, state.found, tried[curve], chosen->p);
+  return true;
 }
 
 void smooth_curves(const SearchData& data, Found& found, std::size_t first) {

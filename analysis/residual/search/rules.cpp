@@ -1,6 +1,7 @@
 #include "analysis/residual/search/rules.h"
 
 #include "analysis/residual/likelihood/testability.h"
+#include "analysis/residual/search/one_block.h"
 #include "analysis/residual/search/unseen.h"
 
 #include <algorithm>
@@ -41,6 +42,15 @@ bool is_told_by_one_block(const CrossValidation& without, const CrossValidation&
   for (std::size_t fold = 0; fold < with.folds.size(); ++fold)
     if (with.folds[fold].undetermined && !without.folds[fold].undetermined) return true;
   return false;
+}
+
+/// Whether one block could be missed for none of a fit's last term. Theory's coefficient is not the data's.
+bool is_shown_by_one_block(const SearchData& data, const Found& found, const JointFit& fit) {
+  const Term& term = fit.model.terms.back();
+  const auto amplitude = fit.linear.column_of({fit.model.terms.size() - 1, 0});
+  if (!amplitude || term.at_theory || term.per_group || term.effect->theory_only) return false;
+  const Components& column = fit.linear.columns[static_cast<std::size_t>(*amplitude)];
+  return block_that_alone_shows(data, found.fit, {column}).has_value();
 }
 
 /// An effect over a condition of the model's last that is, together with that, no more than a small part of
@@ -127,6 +137,8 @@ std::optional<std::string> why_not(const SearchData& data, const Found& found, c
     return fmt::format("{} without rotor_speed is no way of the speed", term.label());
   if (const auto shared = only_bends(data, found, term, fit.variances, after))
     return fmt::format("{} is no more than a bend over {}", term.label(), *shared);
+  if (is_shown_by_one_block(data, found, fit))
+    return fmt::format("{} is shown by one block alone", term.label());
   if (const Term* other = cancelled_by_newest(data, fit))
     return fmt::format("{} and {} would cancel each other", term.label(), other->label());
   if (term.effect->has_change_point() && is_gradual(data, found.fit, {term}, fit.variances, after))
