@@ -80,30 +80,31 @@ struct Chosen {
   double p;
 };
 
-/// The curve to add: the best of a scan; where one block alone shows that, the best without this block, if it
-/// is beyond chance there as well. What is not is recorded.
+/// The curve to add: the best of a scan; where the runs without one block say little of that, the best of
+/// these, if it is beyond chance there as well. What is not is recorded.
 std::optional<Chosen> choose(SearchState& state, const CurveScan& curves, NullMaxima& maxima) {
+  constexpr double kLittle = 0.2;  // of data sets without effect so many have as much
   const auto& [scan, tried] = curves;
   const double alpha = state.data.settings().alpha;
   const Chosen best{scan.order[0], maxima.p(scan.fits[scan.order[0]].evidence)};
   Round& round = state.record.curve_rounds.back();
   round.outcome = fmt::format("p = {:.3g} for {}", best.p, tried[best.curve].label());
   if (best.p > alpha) return {};
-  const std::optional<int> block =
-      block_that_alone_shows(state.data, state.found.fit, tried[best.curve].columns);
-  if (!block) return best;
-  const auto without = fits_without(state.data, state.found.fit, *block, scan.candidates);
+  if (state.data.observations().blocks_are_rows) return best;  // of which a wild one is told by itself
+  const int block = block_missed_most(state.data, state.found.fit, tried[best.curve].columns);
+  const auto without = fits_without(state.data, state.found.fit, block, scan.candidates);
+  if (maxima.p(without[best.curve].evidence) <= kLittle) return best;
   std::optional<Chosen> other;
   for (std::size_t i = 0; i < tried.size(); ++i) {
     if (maxima.p(scan.fits[i].evidence) > alpha) continue;
     const double p = maxima.p(without[i].evidence);
     if (p > alpha)
-      state.record.of_one_block.push_back({tried[i].covariate, tried[i].rotor, *block});
+      state.record.of_one_block.push_back({tried[i].covariate, tried[i].rotor, block});
     else if (!other || without[i].evidence > without[other->curve].evidence)
       other = Chosen{i, p};
   }
   round.outcome += fmt::format(", by block {} alone",
-                               state.data.observations().block_name[static_cast<std::size_t>(*block)]);
+                               state.data.observations().block_name[static_cast<std::size_t>(block)]);
   if (other)
     round.outcome += fmt::format("; without it p = {:.3g} for {}", other->p, tried[other->curve].label());
   return other;

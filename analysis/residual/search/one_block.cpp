@@ -37,10 +37,9 @@ Left beside_model(const SearchData& data, const JointFit& base, const std::vecto
   return {stacked.middleCols(adopted, own), stacked.col(adopted + own)};
 }
 
-/// Place of the block that the columns' evidence falls most without, as far as products tell: with the
-/// variances, and what was taken out, as they are with it.
-std::size_t missed_most(const SearchData& data, const JointFit& base,
-                        const std::vector<Components>& columns) {
+}  // namespace
+
+int block_missed_most(const SearchData& data, const JointFit& base, const std::vector<Components>& columns) {
   const auto& blocks = data.mixed().blocks();
   const auto k = static_cast<Index>(columns.size());
   std::vector<MatrixXd> squares(blocks.size(), MatrixXd::Zero(k, k));
@@ -72,10 +71,9 @@ std::size_t missed_most(const SearchData& data, const JointFit& base,
       most = b;
     }
   }
-  return most;
+  const int row = data.rows()[static_cast<std::size_t>(blocks[most].front())];
+  return data.observations().block[static_cast<std::size_t>(row)];
 }
-
-}  // namespace
 
 std::vector<CandidateFit> fits_without(const SearchData& data, const JointFit& base, int block,
                                        const std::vector<Candidate>& candidates) {
@@ -84,18 +82,6 @@ std::vector<CandidateFit> fits_without(const SearchData& data, const JointFit& b
                 [&](int row) { return data.observations().block[static_cast<std::size_t>(row)] == block; });
   const MixedModel rest(data.observations(), std::move(others));
   return CandidateScan(rest, base.linear.columns, candidates).fit(difference(data.y(), base.linear.offset));
-}
-
-std::optional<int> block_that_alone_shows(const SearchData& data, const JointFit& base,
-                                          const std::vector<Components>& columns) {
-  constexpr double kChance = 0.05;
-  if (data.observations().blocks_are_rows) return std::nullopt;
-  const auto& of_it = data.mixed().blocks()[missed_most(data, base, columns)];
-  const int row = data.rows()[static_cast<std::size_t>(of_it.front())];
-  const int block = data.observations().block[static_cast<std::size_t>(row)];
-  const double evidence = fits_without(data, base, block, {{.columns = columns}}).front().evidence;
-  if (evidence < -std::log10(kChance)) return block;
-  return std::nullopt;
 }
 
 }  // namespace tunnelrig

@@ -3,19 +3,15 @@
 
 #include "analysis/residual/search/search_data.h"
 
-#include <optional>
 #include <vector>
 
 namespace tunnelrig {
 
-/// The block, as observations number them, without which the runs say nothing of columns on top of a fit that
-/// are beyond chance with it (5 %, as a question of its own): one bad day whose conditions were special, say.
-/// Nothing where any one block can be missed, or blocks are single rows, of which a wild one is told by
-/// itself.
-std::optional<int> block_that_alone_shows(const SearchData& data, const JointFit& base,
-                                          const std::vector<Components>& columns);
+/// The block, as observations number them, without which the evidence of columns on top of a fit falls most,
+/// as far as products tell: with the variances, and what is taken out, as they are with it.
+int block_missed_most(const SearchData& data, const JointFit& base, const std::vector<Components>& columns);
 
-/// Candidates on top of a fit, by the runs without one block.
+/// Candidates on top of a fit, by the runs without one block: one bad day whose conditions were special, say.
 std::vector<CandidateFit> fits_without(const SearchData& data, const JointFit& base, int block,
                                        const std::vector<Candidate>& candidates);
 

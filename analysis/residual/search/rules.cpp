@@ -44,13 +44,18 @@ bool is_told_by_one_block(const CrossValidation& without, const CrossValidation&
   return false;
 }
 
-/// Whether one block could be missed for none of a fit's last term. Theory's coefficient is not the data's.
+/// Whether the runs without one block say nothing of a fit's last term. Theory's coefficient is not the
+/// data's; of single rows a wild one is told by itself.
 bool is_shown_by_one_block(const SearchData& data, const Found& found, const JointFit& fit) {
+  constexpr double kChance = 0.05;
   const Term& term = fit.model.terms.back();
   const auto amplitude = fit.linear.column_of({fit.model.terms.size() - 1, 0});
-  if (!amplitude || term.at_theory || term.per_group || term.effect->theory_only) return false;
-  const Components& column = fit.linear.columns[static_cast<std::size_t>(*amplitude)];
-  return block_that_alone_shows(data, found.fit, {column}).has_value();
+  if (data.observations().blocks_are_rows || !amplitude || term.at_theory || term.per_group ||
+      term.effect->theory_only)
+    return false;
+  const std::vector<Components> column{fit.linear.columns[static_cast<std::size_t>(*amplitude)]};
+  const int block = block_missed_most(data, found.fit, column);
+  return fits_without(data, found.fit, block, {{.columns = column}}).front().evidence < -std::log10(kChance);
 }
 
 /// An effect over a condition of the model's last that is, together with that, no more than a small part of
