@@ -245,6 +245,10 @@ void warn_of_tares(const Observations& observations, const MeanModel& model, Exp
                   first_few(tares, kNamed)));
 }
 
+std::string block_noun(const Observations& observations) {
+  return observations.from_table ? "block" : "session";
+}
+
 void warn_of_single_blocks(const Observations& observations, const std::vector<OfOneBlock>& found,
                            Explanation& explanation) {
   constexpr std::size_t kNamed = 4;
@@ -254,10 +258,8 @@ void warn_of_single_blocks(const Observations& observations, const std::vector<O
       return unknown.condition == each.covariate && unknown.rotor == each.rotor;
     };
     std::vector<std::string>& names = over[each.block];
-    const std::string name =
-        each.covariate + (each.rotor < 0 ? "" : fmt::format(" of rotor {}", each.rotor + 1));
-    const bool said = std::ranges::count(names, name) > 0;
-    if (!said && std::ranges::none_of(explanation.unknown, is_it)) names.push_back(name);
+    const bool said = std::ranges::count(names, each.label) > 0;
+    if (!said && std::ranges::none_of(explanation.unknown, is_it)) names.push_back(each.label);
   }
   for (const auto& [block, names] : over) {
     if (names.empty()) continue;
@@ -265,8 +267,8 @@ void warn_of_single_blocks(const Observations& observations, const std::vector<O
         "{0} {1} alone shows that the response goes with {2}, and the others say nothing of it: a "
         "dependence is not told from whatever else was special there; the same conditions in another {0} "
         "would tell",
-        observations.from_table ? "block" : "session",
-        observations.block_name[static_cast<std::size_t>(block)], first_few(names, kNamed)));
+        block_noun(observations), observations.block_name[static_cast<std::size_t>(block)],
+        first_few(names, kNamed)));
   }
 }
 

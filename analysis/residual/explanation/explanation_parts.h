@@ -93,6 +93,9 @@ void warn_of_companions(const Observations& observations, const std::vector<cons
 /// Constants of a table's thrusts beside their C_T, where the baseline has them.
 void warn_of_tares(const Observations& observations, const MeanModel& model, Explanation& explanation);
 
+/// What the campaign, or the table, calls a block.
+std::string block_noun(const Observations& observations);
+
 /// Blocks that alone show a structure, of which nothing else is reported.
 void warn_of_single_blocks(const Observations& observations, const std::vector<OfOneBlock>& found,
                            Explanation& explanation);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -68,23 +69,9 @@ std::optional<TwoAmplitudes> apart(const Observations& observations, const Joint
   return result;
 }
 
-/// What a curve's columns do together, which are those of the fit from `first` on.
-Components made_by(const Observations& observations, const JointFit& fit, std::size_t first,
-                   std::size_t count, const std::vector<int>& rows) {
-  const Components y = difference(response_components(observations), fit.linear.offset);
-  const Eigen::VectorXd amplitude =
-      fit_amplitudes(observations, y, fit.linear.columns, fit.variances, rows).amplitude;
-  Components made = fit.linear.columns[first];
-  for (MatrixXd& component : made) component *= amplitude(static_cast<Index>(first));
-  for (std::size_t k = first + 1; k < first + count; ++k)
-    for (std::size_t component = 0; component < made.size(); ++component)
-      made[component] += amplitude(static_cast<Index>(k)) * fit.linear.columns[k][component];
-  return made;
-}
-
 void warn_of_effects(const Observations& observations, const JointFit& fit, const std::vector<int>& rows,
                      Explanation& explanation) {
-  const char* block = observations.from_table ? "block" : "session";
+  const std::string block = block_noun(observations);
   for (std::size_t t = 0; t < explanation.adopted.size(); ++t) {
     const std::optional<Index> place = fit.linear.column_of({t, 0});
     const AdoptedEffect& adopted = explanation.adopted[t];
@@ -107,14 +94,20 @@ void warn_of_effects(const Observations& observations, const JointFit& fit, cons
 
 void warn_of_curves(const Observations& observations, const JointFit& fit, const std::vector<int>& rows,
                     Explanation& explanation) {
-  const char* block = observations.from_table ? "block" : "session";
+  const std::string block = block_noun(observations);
+  const Eigen::VectorXd amplitude =
+      fit_amplitudes(observations, difference(response_components(observations), fit.linear.offset),
+                     fit.linear.columns, fit.variances, rows)
+          .amplitude;
   std::size_t first = fit.linear.of_parameters.size();
   for (const Curve& curve : fit.model.curves) {
     const std::size_t own = first, count = curve.columns.size();
     first += count;
     if (curve.x.size() == 0 || curve.strength || !differ_within_blocks(observations, {curve.covariate}))
       continue;
-    const auto of = apart(observations, fit, own, count, made_by(observations, fit, own, count, rows), rows);
+    const Components made = combined(std::span(fit.linear.columns).subspan(own, count),
+                                     amplitude.segment(static_cast<Index>(own), static_cast<Index>(count)));
+    const auto of = apart(observations, fit, own, count, made, rows);
     if (!of) continue;
     explanation.warnings.push_back(fmt::format(
         "what goes with {}: within {}s it is {:.2g} times its curve and from one to the next {:.2g} times, "

@@ -270,11 +270,20 @@ AmplitudeFit fit_amplitudes(const Observations& observations, const Components& 
   return {fit.amplitude, fit.covariance, fit.equations.a};
 }
 
+Components combined(std::span<const Components> columns, const VectorXd& amplitude) {
+  Components result = columns.front();
+  for (MatrixXd& component : result) component *= amplitude(0);
+  for (std::size_t c = 1; c < columns.size(); ++c)
+    for (std::size_t k = 0; k < result.size(); ++k)
+      result[k] += amplitude(static_cast<Index>(c)) * columns[c][k];
+  return result;
+}
+
 Components left_beside(const Observations& observations, Components y, const std::vector<Components>& columns,
                        const NullFit& null, const std::vector<int>& rows) {
-  const VectorXd amplitude = fit_amplitudes(observations, y, columns, null, rows).amplitude;
-  for (std::size_t c = 0; c < columns.size(); ++c)
-    for (std::size_t k = 0; k < y.size(); ++k) y[k] -= amplitude(static_cast<Index>(c)) * columns[c][k];
+  if (columns.empty()) return y;
+  const Components made = combined(columns, fit_amplitudes(observations, y, columns, null, rows).amplitude);
+  for (std::size_t k = 0; k < y.size(); ++k) y[k] -= made[k];
   return y;
 }
 

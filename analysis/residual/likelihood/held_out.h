@@ -3,6 +3,7 @@
 
 #include "analysis/residual/likelihood/likelihood.h"
 
+#include <span>
 #include <vector>
 
 namespace tunnelrig {
@@ -33,7 +34,10 @@ AmplitudeFit fit_amplitudes(const Observations& observations, const Components& 
                             const std::vector<Components>& columns, const NullFit& null,
                             const std::vector<int>& rows);
 
-/// y less the columns at these amplitudes, the baseline still in it.
+/// What columns do together at these amplitudes.
+Components combined(std::span<const Components> columns, const Eigen::VectorXd& amplitude);
+
+/// y less the columns at the amplitudes that fit best, the baseline still in it.
 Components left_beside(const Observations& observations, Components y, const std::vector<Components>& columns,
                        const NullFit& null, const std::vector<int>& rows);
 

@@ -73,8 +73,9 @@ struct FoundCurve {
 /// Structure that is beyond chance, and without one block is not: of that block, whatever it was.
 struct OfOneBlock {
   std::string covariate;
-  int rotor = -1;  // −1: all
-  int block = 0;   // as observations number them
+  int rotor = -1;     // −1: all
+  std::string label;  // of the curve: what it is over, where and of which rotor
+  int block = 0;      // as observations number them
 };
 
 /// Sessions scatter far more than runs.

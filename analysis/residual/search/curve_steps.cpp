@@ -80,33 +80,53 @@ struct Chosen {
   double p;
 };
 
+/// Of the curves that all runs show, the best that those without the block show too; what they do not show is
+/// recorded.
+std::optional<Chosen> best_without(SearchState& state, const CurveScan& curves, NullMaxima& maxima,
+                                   int block) {
+  const double alpha = state.data.settings().alpha;
+  std::vector<std::size_t> beyond_chance;
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < curves.tried.size(); ++i)
+    if (maxima.p(curves.scan.fits[i].evidence) <= alpha) {
+      beyond_chance.push_back(i);
+      candidates.push_back(curves.scan.candidates[i]);
+    }
+  const auto without = fits_without(state.data, state.found.fit, block, candidates);
+  std::optional<Chosen> best;
+  double most = 0;
+  for (std::size_t k = 0; k < beyond_chance.size(); ++k) {
+    const Curve& curve = curves.tried[beyond_chance[k]];
+    const double p = maxima.p(without[k].evidence);
+    if (p > alpha) {
+      state.record.of_one_block.push_back({curve.covariate, curve.rotor, curve.label(), block});
+    } else if (!best || without[k].evidence > most) {
+      best = Chosen{beyond_chance[k], p};
+      most = without[k].evidence;
+    }
+  }
+  return best;
+}
+
 /// The curve to add: the best of a scan; where the runs without one block say little of that, the best of
-/// these, if it is beyond chance there as well. What is not is recorded.
+/// these, if it is beyond chance there as well.
 std::optional<Chosen> choose(SearchState& state, const CurveScan& curves, NullMaxima& maxima) {
   constexpr double kLittle = 0.2;  // of data sets without effect so many have as much
-  const auto& [scan, tried] = curves;
-  const double alpha = state.data.settings().alpha;
-  const Chosen best{scan.order[0], maxima.p(scan.fits[scan.order[0]].evidence)};
-  Round& round = state.record.curve_rounds.back();
-  round.outcome = fmt::format("p = {:.3g} for {}", best.p, tried[best.curve].label());
-  if (best.p > alpha) return {};
-  if (state.data.observations().blocks_are_rows) return best;  // of which a wild one is told by itself
-  const int block = block_missed_most(state.data, state.found.fit, tried[best.curve].columns);
-  const auto without = fits_without(state.data, state.found.fit, block, scan.candidates);
-  if (maxima.p(without[best.curve].evidence) <= kLittle) return best;
-  std::optional<Chosen> other;
-  for (std::size_t i = 0; i < tried.size(); ++i) {
-    if (maxima.p(scan.fits[i].evidence) > alpha) continue;
-    const double p = maxima.p(without[i].evidence);
-    if (p > alpha)
-      state.record.of_one_block.push_back({tried[i].covariate, tried[i].rotor, block});
-    else if (!other || without[i].evidence > without[other->curve].evidence)
-      other = Chosen{i, p};
-  }
-  round.outcome += fmt::format(", by block {} alone",
-                               state.data.observations().block_name[static_cast<std::size_t>(block)]);
+  const SearchData& data = state.data;
+  const std::size_t first = curves.scan.order[0];
+  const Chosen best{first, maxima.p(curves.scan.fits[first].evidence)};
+  std::string& outcome = state.record.curve_rounds.back().outcome;
+  outcome = fmt::format("p = {:.3g} for {}", best.p, curves.tried[first].label());
+  if (best.p > data.settings().alpha) return {};
+  if (data.observations().blocks_are_rows) return best;  // of which a wild one is told by itself
+  const int block = block_missed_most(data, state.found.fit, curves.tried[first].columns);
+  const auto rest = fits_without(data, state.found.fit, block, {curves.scan.candidates[first]});
+  if (maxima.p(rest[0].evidence) <= kLittle) return best;
+  const std::optional<Chosen> other = best_without(state, curves, maxima, block);
+  outcome +=
+      fmt::format(", by block {} alone", data.observations().block_name[static_cast<std::size_t>(block)]);
   if (other)
-    round.outcome += fmt::format("; without it p = {:.3g} for {}", other->p, tried[other->curve].label());
+    outcome += fmt::format("; without it p = {:.3g} for {}", other->p, curves.tried[other->curve].label());
   return other;
 }
 

@@ -50,10 +50,7 @@ Eigen::MatrixXd made_by_newest_curve(const SearchData& data, const JointFit& fit
       fit_amplitudes(data.observations(), difference(data.y(), fit.linear.offset), fit.linear.columns,
                      fit.variances, data.rows())
           .amplitude.tail(std::ssize(columns));
-  Eigen::MatrixXd made = Eigen::MatrixXd::Zero(data.observations().rows(), data.observations().channels());
-  for (std::size_t k = 0; k < columns.size(); ++k)
-    made += amplitude(static_cast<Eigen::Index>(k)) * columns[k][0];
-  return made;
+  return combined(columns, amplitude)[0];
 }
 
 }  // namespace

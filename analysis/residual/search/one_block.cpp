@@ -1,7 +1,6 @@
 #include "analysis/residual/search/one_block.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -19,9 +18,8 @@ struct Left {
 };
 
 Left beside_model(const SearchData& data, const JointFit& base, const std::vector<Components>& own_columns,
-                  std::size_t stratum) {
+                  const Components& y, std::size_t stratum) {
   const MixedModel& mixed = data.mixed();
-  const Components y = difference(data.y(), base.linear.offset);
   std::vector<const Components*> items = pointers_to(base.linear.columns);
   const auto adopted = static_cast<Index>(items.size()), own = static_cast<Index>(own_columns.size());
   for (const Components& column : own_columns) items.push_back(&column);
@@ -42,10 +40,11 @@ Left beside_model(const SearchData& data, const JointFit& base, const std::vecto
 int block_missed_most(const SearchData& data, const JointFit& base, const std::vector<Components>& columns) {
   const auto& blocks = data.mixed().blocks();
   const auto k = static_cast<Index>(columns.size());
+  const Components y = difference(data.y(), base.linear.offset);
   std::vector<MatrixXd> squares(blocks.size(), MatrixXd::Zero(k, k));
   std::vector<VectorXd> products(blocks.size(), VectorXd::Zero(k));
   for (std::size_t s = 0; s < data.mixed().strata().size(); ++s) {
-    const Left left = beside_model(data, base, columns, s);
+    const Left left = beside_model(data, base, columns, y, s);
     const auto runs = static_cast<Index>(data.rows().size());
     for (std::size_t b = 0; b < blocks.size(); ++b)
       for (const Index run : blocks[b])
