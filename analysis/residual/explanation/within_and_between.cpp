@@ -94,6 +94,7 @@ void warn_of_effects(const Observations& observations, const JointFit& fit, cons
 
 void warn_of_curves(const Observations& observations, const JointFit& fit, const std::vector<int>& rows,
                     Explanation& explanation) {
+  if (fit.model.curves.empty()) return;
   const std::string block = block_noun(observations);
   const Eigen::VectorXd amplitude =
       fit_amplitudes(observations, difference(response_components(observations), fit.linear.offset),

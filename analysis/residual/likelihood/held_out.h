@@ -34,7 +34,7 @@ AmplitudeFit fit_amplitudes(const Observations& observations, const Components& 
                             const std::vector<Components>& columns, const NullFit& null,
                             const std::vector<int>& rows);
 
-/// What columns do together at these amplitudes.
+/// What columns, one at least, do together at these amplitudes.
 Components combined(std::span<const Components> columns, const Eigen::VectorXd& amplitude);
 
 /// y less the columns at the amplitudes that fit best, the baseline still in it.
