@@ -110,6 +110,9 @@ void require_adoptable(const Observations& observations) {
         "--adopt: a model corrects the thrusts of a campaign, and this explains {} of {}; without it "
         "the errors are the same, with --adopt-empirical those with the curves",
         observations.response, observations.campaign.empty() ? "a table" : observations.campaign));
+  // What all rotors have in common is of this one as well.
+  for (const auto& [rotor, why] : observations.unmeasured)
+    throw InputError("--adopt: " + why + "; a model would make a thrust of it");
 }
 
 Adoption adopt(const Observations& observations, const Explanation& explanation, bool empirical) {

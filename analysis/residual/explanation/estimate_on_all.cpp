@@ -126,6 +126,7 @@ void estimate_on_all(const Models& models, const Observations& observations,
       explanation.suspect_rows.push_back(row);
   found.of_one_block.insert(found.of_one_block.end(), left.of_one_block.begin(), left.of_one_block.end());
   warn_of_single_blocks(observations, found.of_one_block, explanation);
+  warn_of_odd_blocks(observations, explanation);
   warn_of_alike_rows(observations, explanation);
   warn_of_tares(wide, whole.model, explanation);
   warn_of_changes_at_steps(observations, explanation);

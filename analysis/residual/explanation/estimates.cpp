@@ -177,14 +177,13 @@ namespace {
 /// 2003).
 std::size_t outside_median_interval(std::size_t n) {
   constexpr double kBeyond = 0.025;
-  double tail = std::pow(0.5, static_cast<double>(n)), term = tail;  // P(at most k of n)
-  std::size_t k = 0;
-  while (tail <= kBeyond) {
-    ++k;
-    term *= static_cast<double>(n - k + 1) / static_cast<double>(k);
-    tail += term;
+  const auto of = static_cast<double>(n);
+  double tail = 0;  // P(at most k of n); 0.5ⁿ itself is less than the least number from n = 1,075 on
+  for (double k = 0; k < of; ++k) {
+    tail += std::exp(std::lgamma(of + 1) - std::lgamma(k + 1) - std::lgamma(of - k + 1) - of * std::log(2.0));
+    if (tail > kBeyond) return static_cast<std::size_t>(std::max(k - 1, 0.0));
   }
-  return k > 0 ? k - 1 : 0;
+  return 0;
 }
 
 }  // namespace

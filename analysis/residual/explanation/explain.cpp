@@ -1,5 +1,6 @@
 // The protocol done again without what it showed to be wrong: gross rows, conditions far from all others.
 #include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/likelihood/scores.h"
 
 #include <algorithm>
 #include <utility>
@@ -25,13 +26,23 @@ std::vector<int> rows_but(const Observations& observations, const std::vector<Su
 
 /// What is left of the rows, and what is not.
 struct SetAside {
+  const Observations& all;
   Observations kept;
   std::size_t most;
   std::vector<SuspectRow> rows;
 
-  explicit SetAside(const Observations& all)
-      : kept(all), most(all.name.size() / (all.from_table ? kRowsPerGross : kRunsPerGross)) {}
+  explicit SetAside(const Observations& given)
+      : all(given), kept(all), most(all.name.size() / (all.from_table ? kRowsPerGross : kRunsPerGross)) {}
   std::size_t room() const { return most - std::min(most, rows.size()); }
+  /// Whether there is room for them, and what is left differs and has a row that the table holds out.
+  bool can_take(const std::vector<SuspectRow>& gross) const {
+    if (gross.size() > room()) return false;
+    const std::vector<int> left = rows_but(kept, gross);
+    const Eigen::MatrixXd value = kept.value(left, Eigen::all);
+    return value.maxCoeff() > value.minCoeff() &&
+           (kept.held_out.empty() ||
+            std::ranges::any_of(left, [&](int row) { return kept.held_out[static_cast<std::size_t>(row)]; }));
+  }
   void take(const std::vector<SuspectRow>& gross) {
     kept = kept.subset(rows_but(kept, gross));
     for (SuspectRow row : gross) {
@@ -39,7 +50,29 @@ struct SetAside {
       rows.push_back(row);
     }
   }
+  void put_back(const SuspectRow& row) {
+    std::erase_if(rows, [&](const SuspectRow& each) { return each.row == row.row; });
+    kept = all.subset(rows_but(all, rows));
+  }
 };
+
+/// Whether effects that the other rows have named predict this one as well: it lies where they do most.
+bool is_predicted(const Observations& observations, const SuspectRow& row, const MeanModel& model) {
+  constexpr double kWithin = 4, kOfBaselines = 0.25;  // standard deviations; of the error without them
+  const auto goes_by_other_rows = [](const Term& term) {
+    return term.per_group || term.effect->has_change_point();
+  };
+  if (model.terms.empty() || !model.curves.empty() || std::ranges::any_of(model.terms, goes_by_other_rows))
+    return false;
+  const std::vector<int> others = rows_but(observations, {row});
+  const auto place = std::ranges::find(observations.name, row.row) - observations.name.begin();
+  const auto error_of = [&](const MeanModel& tried) {
+    return score(observations, fit_jointly(observations, tried, others), others, {static_cast<int>(place)});
+  };
+  const HeldOutErrors with = error_of(model), without = error_of({});
+  const double error = std::abs(with.error(0, 0));
+  return error <= kWithin * with.expected_std(0, 0) && error <= kOfBaselines * std::abs(without.error(0, 0));
+}
 
 /// A block of which most rows are set aside has more that is wrong than these.
 void warn_of_half_blocks(const Observations& observations, const SetAside& aside,
@@ -82,7 +115,7 @@ void set_mistyped_aside(SetAside& aside, std::vector<std::string>& said) {
     });
   });
   const std::vector<SuspectRow> rows = rows_of(values);
-  const bool few = rows.size() <= aside.room();
+  const bool few = aside.can_take(rows);
   if (few) aside.take(rows);
   for (const IsolatedValue& value : values)
     said.push_back(in_words(value, few ? "set aside; a typing error?" : "a typing error?"));
@@ -98,7 +131,7 @@ Explanation without_isolated(Explanation explanation, SetAside& aside,
   if (isolated.empty()) return explanation;
   const bool misled = explanation.after.held_out_rmse > explanation.before.held_out_rmse;
   const std::vector<SuspectRow> rows = rows_of(isolated);
-  const bool aside_too = misled && rows.size() <= aside.room();
+  const bool aside_too = misled && aside.can_take(rows);
   if (aside_too) {
     aside.take(rows);
     explanation = explain_once(aside.kept, effects, settings);
@@ -127,16 +160,22 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
   // A gross error hides what else is there: it is set aside, and said.
   SetAside aside(observations);
   std::vector<std::string> said = blocks_apart(observations);
-  if (const auto row = lone_row(aside.kept); row && aside.room() > 0) aside.take({*row});
+  auto lone = lone_row(aside.kept);
+  if (lone && !aside.can_take({*lone})) lone.reset();
+  if (lone) aside.take({*lone});
   while (const auto row = gross_row(aside.kept)) {
-    if (aside.room() == 0) break;
+    if (!aside.can_take({*row})) break;
     aside.take({*row});
   }
   if (!observations.from_table) {
     set_mistyped_aside(aside, said);
-    if (const auto wild = wild_runs(aside.kept); wild.size() <= aside.room()) aside.take(wild);
+    if (const auto wild = wild_runs(aside.kept); aside.can_take(wild)) aside.take(wild);
   }
   Explanation explanation = explain_once(aside.kept, effects, settings);
+  if (lone && is_predicted(observations, *lone, explanation.model)) {
+    aside.put_back(*lone);
+    explanation = explain_once(aside.kept, effects, settings);
+  }
   for (int again = 0; again < kMostSearches; ++again) {
     const std::vector<SuspectRow> gross = gross_rows(aside.kept, explanation.suspect_rows);
     if (gross.empty()) break;
@@ -148,6 +187,7 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
                       aside.rows.empty() ? "" : fmt::format(", and {} are", aside.rows.size())));
       break;
     }
+    if (!aside.can_take(gross)) break;
     aside.take(gross);
     explanation = explain_once(aside.kept, effects, settings);
   }

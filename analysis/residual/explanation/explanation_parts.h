@@ -100,6 +100,9 @@ std::string block_noun(const Observations& observations);
 void warn_of_single_blocks(const Observations& observations, const std::vector<OfOneBlock>& found,
                            Explanation& explanation);
 
+/// Blocks that are far from what the others lead to expect, all rotors or one against the rest: a bad day.
+void warn_of_odd_blocks(const Observations& observations, Explanation& explanation);
+
 /// Rows that stand for themselves, but resemble the row before them in what the model leaves.
 void warn_of_alike_rows(const Observations& observations, Explanation& explanation);
 
@@ -182,6 +185,11 @@ inline constexpr std::size_t kRowsPerGross = 10;  // of a table: at most one row
 double degrees_of_freedom(const Observations& observations, const JointFit& fit,
                           const std::vector<int>& rows);
 
+/// Of a normal distribution, by sizes of deviations from medians that a few gross ones may be among. The run
+/// that is the median of its location deviates by 0, and so does one that stands alone: they say nothing of
+/// it. 0 where none says anything.
+double sigma_by_median(const Eigen::VectorXd& sizes);
+
 /// Rows whose externally studentised residual is beyond what n normal ones reach once in a hundred data sets.
 /// `errors` are of the fitted rows: their variance is σ²(1 − h), where expected_std has σ²(1 + h).
 std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
@@ -189,8 +197,10 @@ std::vector<SuspectRow> suspect_rows(const Observations& observations, const Hel
 
 /// Rows that were held out, and are far from what was predicted for them while the rest of their block is
 /// not, in σ by the median: a fit with them in bends to them. Of predictions beyond what a table holds out by
-/// name, or of blocks of one row, nothing says that it is the row that is wrong.
-std::vector<SuspectRow> apart_from_their_block(const Observations& observations, const HeldOutErrors& sealed);
+/// name, or of blocks of one row, nothing says that it is the row that is wrong; nor of those beyond the rows
+/// that one of the model's curves was seen in.
+std::vector<SuspectRow> apart_from_their_block(const Observations& observations, const MeanModel& model,
+                                               const HeldOutErrors& sealed);
 
 /// Blocks of a table that the baseline leaves far from all others, in words: their unit may be another.
 std::vector<std::string> blocks_apart(const Observations& observations);

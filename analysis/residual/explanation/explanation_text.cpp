@@ -190,7 +190,7 @@ std::string in_words(const SuspectRow& row) {
 
 std::string verdict_in_words(const Explanation& e) {
   if (e.verdict == "insufficient") return "There are too few blocks, or runs, to say anything.";
-  if (e.verdict == "no_structure") return "Nothing beyond chance was found.";
+  if (e.verdict == "no_structure") return "Nothing beyond chance goes with what is known of the runs.";
   if (e.verdict == "unknown")
     return "There is structure, but no candidate accounts for it: the cause is not known.";
   if (e.verdict == "partly_explained")

@@ -38,12 +38,20 @@ std::vector<std::string> nearly_complete(const Observations& observations) {
   return names;
 }
 
-/// The runs that have all of them, in which they are candidates.
+/// The runs that have all of them, in which they are candidates. Where none that is held out can be scored
+/// there, those that are not are sealed by blocks.
 Observations with_all(const Observations& observations, const std::vector<std::string>& names) {
   std::vector<int> rows;
   for (const int row : observations.all_rows())
     if (has_all(observations, row, names)) rows.push_back(row);
   Observations complete = observations.subset(rows);
+  if (const bool declared = !observations.held_out.empty(); declared) {
+    const Seal there = seal_blocks(complete, 0);
+    if (!can_be_scored(complete, there, there.sealed)) {
+      complete = complete.subset(there.open);
+      complete.held_out.clear();
+    }
+  }
   for (const std::string& name : names) complete.not_usable.erase(name);
   return complete;
 }
@@ -110,7 +118,7 @@ Explanation without_names_of_incomplete(Explanation explanation, const Observati
       if (effect->theory_only || is_found_there(*effect)) left.push_back(effect);
     Explanation again = explain_once(observations, left, settings);
     again.untestable = std::move(explanation.untestable);
-    again.seal_chose = explanation.seal_chose;
+    again.seal_chose = true;  // the runs that have all are of sealed blocks as well
     explanation = std::move(again);
   }
   for (UnknownStructure& unknown :

@@ -67,16 +67,6 @@ JointFit without_curves(JointFit fit, const Observations& observations, const st
   return fit;
 }
 
-/// Whether anything predicts one of these sealed rows: another run of its location, or where the block is the
-/// group the rest of it.
-bool can_be_scored(const Observations& observations, const Seal& seal, const std::vector<int>& rows) {
-  const auto open = places_of_each(observations.group, seal.open);
-  return std::ranges::any_of(rows, [&](int row) {
-    return observations.groups_within_blocks ||
-           open.contains(observations.group[static_cast<std::size_t>(row)]);
-  });
-}
-
 /// Why nothing can be found out, in words; empty where something can.
 std::string too_few(const Observations& observations, const Seal& seal) {
   if (observations.blocks() < kFewestBlocks)
@@ -184,6 +174,10 @@ void report_search(const Attribution& found, const Observations& observations, c
         fmt::format("the search ended with {} effects, as many as --max-effects allows: where there are "
                     "more, these may be wrong; try more",
                     found.accepted.size()));
+  if (!found.curves.empty() && static_cast<int>(found.curves.size()) >= settings.most_curves)
+    explanation.warnings.push_back(
+        fmt::format("the search ended with {} curves, as many as are sought: there may be more structure",
+                    found.curves.size()));
   warn_of_bounds(observations, found, explanation);
   explanation.rounds = found.rounds;
   explanation.curve_rounds = found.curve_rounds;
@@ -249,7 +243,7 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
   with_interval(before, baseline, explanation.before);
   with_interval(after, shown, explanation.after);
   const HeldOutErrors whole = all_shown ? after : errors(all_found);
-  explanation.suspect_rows = apart_from_their_block(alone, whole);
+  explanation.suspect_rows = apart_from_their_block(alone, found.final.model, whole);
   HeldOutErrors curves = before;
   if (!found.curves.empty()) {
     const JointFit fit = fit_jointly(alone, {.terms = {}, .curves = found.final.model.curves}, seal.open);
@@ -297,7 +291,7 @@ Explanation explain_once(const Observations& observations, const std::vector<con
   // What the baseline is held against: the same, without what groups have of their own.
   Observations alone = observations;
   alone.scatter = found.observations.scatter;
-  report_untestable(alone, effects, rows, explanation);
+  report_untestable(alone, effects, seal.open, explanation);
   warn_of_scatter(found.observations, explanation);
   report_search(found, observations, settings, explanation);
   const Fitted baseline = fairest_baseline(observations, alone, found, seal.open);

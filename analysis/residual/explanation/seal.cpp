@@ -64,4 +64,12 @@ Seal seal_blocks(const Observations& observations, std::uint64_t seed) {
   return seal;
 }
 
+bool can_be_scored(const Observations& observations, const Seal& seal, const std::vector<int>& rows) {
+  const auto open = places_of_each(observations.group, seal.open);
+  return std::ranges::any_of(rows, [&](int row) {
+    return observations.groups_within_blocks ||
+           open.contains(observations.group[static_cast<std::size_t>(row)]);
+  });
+}
+
 }  // namespace tunnelrig

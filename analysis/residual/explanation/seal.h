@@ -17,4 +17,8 @@ struct Seal {
 /// possible. A table's hold_out rows instead, where it has them. Reproducible for a seed.
 Seal seal_blocks(const Observations& observations, std::uint64_t seed);
 
+/// Whether anything predicts one of these sealed rows: another run of its location, or where the block is the
+/// group the rest of it.
+bool can_be_scored(const Observations& observations, const Seal& seal, const std::vector<int>& rows);
+
 }  // namespace tunnelrig

@@ -26,6 +26,13 @@ double degrees_of_freedom(const Observations& observations, const JointFit& fit,
   return static_cast<double>(std::max<Index>(dof, 2));
 }
 
+double sigma_by_median(const VectorXd& sizes) {
+  constexpr double kMedianOfNormal = 0.6745;
+  std::vector<double> deviations(sizes.begin(), sizes.end());
+  std::erase(deviations, 0.0);
+  return deviations.empty() ? 0 : upper_median(std::move(deviations)) / kMedianOfNormal;
+}
+
 namespace {
 
 /// Of each run and rotor, in y: its own, and what it has in common with the others.
@@ -43,16 +50,6 @@ MatrixXd variance_of_runs(const Observations& observations, const NullFit& varia
               mixed.rotors_of_modes().middleRows(stratum.first_mode, stratum.modes).colwise().squaredNorm();
   }
   return result;
-}
-
-/// Of a normal distribution, by sizes of deviations from medians that a few gross ones may be among. The run
-/// that is the median of its location deviates by 0, and so does one that stands alone: they say nothing of
-/// it.
-double sigma_by_median(const VectorXd& sizes) {
-  constexpr double kMedianOfNormal = 0.6745;
-  std::vector<double> deviations(sizes.begin(), sizes.end());
-  std::erase(deviations, 0.0);
-  return deviations.empty() ? 0 : upper_median(std::move(deviations)) / kMedianOfNormal;
 }
 
 /// σ. A campaign has some 1,700 values that are not typed by hand. Of Student's t with three degrees of
@@ -122,14 +119,26 @@ MatrixXd share_left(const Observations& observations, const HeldOutErrors& error
   return (2 - (errors.expected_std.array() / unit.array()).square() / sigma2.array()).cwiseMax(kLeast);
 }
 
+/// Whether a row lies where a curve of the model has not been: it stays there as it was at its end.
+bool is_beyond_a_curve(const MeanModel& model, int row) {
+  return std::ranges::any_of(model.curves, [&](const Curve& curve) {
+    if (curve.x.size() == 0 || curve.shape == CurveShape::kLevels) return false;
+    const auto x = curve.x.row(row).array();
+    return (x < curve.low || x > curve.high).any();
+  });
+}
+
 }  // namespace
 
-std::vector<SuspectRow> apart_from_their_block(const Observations& observations,
+std::vector<SuspectRow> apart_from_their_block(const Observations& observations, const MeanModel& model,
                                                const HeldOutErrors& sealed) {
   constexpr Index kOthersOfBlock = 4;  // to each that is apart
   if (observations.blocks_are_rows || !observations.held_out.empty()) return {};
-  const VectorXd apart =
-      distance_of_those_apart(observations, sealed.rows, residuals_of(observations, sealed).rowwise().mean());
+  VectorXd residual = residuals_of(observations, sealed).rowwise().mean();
+  for (Index r = 0; r < residual.size(); ++r)
+    if (is_beyond_a_curve(model, sealed.rows[static_cast<std::size_t>(r)]))
+      residual(r) = std::numeric_limits<double>::quiet_NaN();
+  const VectorXd apart = distance_of_those_apart(observations, sealed.rows, residual);
   std::vector<SuspectRow> result;
   for (const auto& [block, rows] : places_of_each(observations.block, sealed.rows)) {
     const VectorXd own = apart(rows);

@@ -28,9 +28,10 @@ void add_structure(const std::string& covariate, const std::string& why, Explana
   explanation.untestable.push_back({kStructure, fmt::format("{} {}", covariate, why), {covariate}});
 }
 
-bool varies_within_groups(const Observations& observations, const Covariate& covariate) {
+bool varies_within_groups(const Observations& observations, const Covariate& covariate,
+                          const std::vector<int>& rows) {
   std::map<int, double> first;
-  for (const int row : observations.all_rows()) {
+  for (const int row : rows) {
     const double value = covariate.value(row, 0);
     if (first.emplace(observations.group[static_cast<std::size_t>(row)], value).first->second != value)
       return true;
@@ -39,15 +40,21 @@ bool varies_within_groups(const Observations& observations, const Covariate& cov
 }
 
 /// Why nothing can be found that follows a condition; empty where something can. `named`: an effect has it.
-std::string unseen(const Observations& observations, const Covariate& covariate, const std::vector<int>& rows,
+/// `open`: the rows of the search.
+std::string unseen(const Observations& observations, const Covariate& covariate, const std::vector<int>& open,
                    bool named) {
-  const bool texts = !covariate.labels.empty(), table = observations.from_table;
-  const int values = different_values(covariate, rows);
-  if (values == 1 || is_constant(covariate))
-    return texts ? "" : fmt::format("is the same in every {}", table ? "row" : "run");
-  if (!varies_within_groups(observations, covariate))
-    return fmt::format("does not vary within any {}", table ? "group" : "location");
-  if ((texts || (values == 2 && !named)) && levels_of(observations, covariate, rows).empty())
+  const bool texts = !covariate.labels.empty();
+  const std::string row = observations.from_table ? "row" : "run",
+                    group = observations.from_table ? "group" : "location";
+  const std::vector<int> all = observations.all_rows();
+  if (different_values(covariate, all) == 1 || is_constant(covariate))
+    return texts ? "" : "is the same in every " + row;
+  const int values = different_values(covariate, open);
+  if (values == 1) return fmt::format("is the same in every open {}", row);
+  if (!varies_within_groups(observations, covariate, all)) return "does not vary within any " + group;
+  if (!varies_within_groups(observations, covariate, open))
+    return fmt::format("does not vary within any {} in the open {}s", group, row);
+  if ((texts || (values == 2 && !named)) && levels_of(observations, covariate, open).empty())
     return "has fewer than two values that three open blocks have, or more than twelve";
   return "";
 }
@@ -137,11 +144,18 @@ void warn_of_many_groups(const Observations& observations, Explanation& explanat
 std::vector<std::string> collinear_with(const Observations& observations, const Covariate& covariate) {
   std::vector<std::string> result;
   if (!covariate.value.allFinite() || is_constant(covariate) || !covariate.labels.empty()) return result;
+  const std::vector<int> all = observations.all_rows();
+  const auto goes_with = [&](const Covariate& other) {
+    if (std::max(std::abs(correlation(covariate, other)), std::abs(rank_correlation(covariate, other))) >=
+        kCollinear)
+      return true;
+    return !covariate.per_channel() && !other.per_channel() &&
+           varies_within_groups(observations, other, all) &&
+           all_but_tells(observations, all, covariate.value.col(0), other.value.col(0));
+  };
   for (const Covariate& other : observations.covariates)
-    if (other.name != covariate.name && other.labels.empty() && other.value.allFinite() &&
-        !(other.derived && covariate.derived) && can_be_followed(observations, other) &&
-        std::max(std::abs(correlation(covariate, other)), std::abs(rank_correlation(covariate, other))) >=
-            kCollinear)
+    if (other.name != covariate.name && other.labels.empty() && !(other.derived && covariate.derived) &&
+        can_be_followed(observations, other) && goes_with(other))
       result.push_back(other.name);
   return result;
 }

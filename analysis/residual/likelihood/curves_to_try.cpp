@@ -221,6 +221,10 @@ class CurvesToTry {
       if (!covariate.derived && !covariate.per_channel() && covariate.labels.empty() &&
           can_be_followed(observations_, covariate))
         conditions.push_back(&covariate);
+    // And what one does may be another from some run on: a cable that came loose, a part that was changed.
+    if (const Covariate* order = observations_.find("run_order");
+        order != nullptr && order->derived && can_be_followed(observations_, *order))
+      conditions.push_back(order);
     for (std::size_t a = 0; a < conditions.size(); ++a)
       for (std::size_t b = a + 1; b < conditions.size(); ++b) add_product(*conditions[a], *conditions[b]);
   }

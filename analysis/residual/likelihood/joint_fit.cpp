@@ -353,8 +353,9 @@ bool is_at_bound(const Term& term, std::size_t k) {
 }
 
 bool at_bound(const JointFit& fit, const Term& term) {
-  return std::find(fit.at_bound.begin(), fit.at_bound.end(),
-                   term.label() + " " + term.effect->parameters[0].name) != fit.at_bound.end();
+  return std::ranges::any_of(fit.at_bound, [&](const ParameterPlace& place) {
+    return place.parameter == 0 && fit.model.terms[place.term].same_way(term);
+  });
 }
 
 JointFit fit_jointly(const Observations& observations, const MeanModel& start, const std::vector<int>& rows) {
@@ -375,11 +376,8 @@ JointFit fit_jointly(const Observations& observations, const MeanModel& start, c
   }
   fit.linear = linearise(observations, fit.model, predict_forces(observations, fit.model, rows));
   fit.variances = CandidateScan(mixed, fit.linear.columns, {}).null_fit(difference(y, fit.linear.offset));
-  for (const ParameterPlace& f : free_parameters(fit.model)) {
-    const Term& term = fit.model.terms[f.term];
-    if (is_at_bound(term, f.parameter))
-      fit.at_bound.push_back(term.label() + " " + term.effect->parameters[f.parameter].name);
-  }
+  for (const ParameterPlace& f : free_parameters(fit.model))
+    if (is_at_bound(fit.model.terms[f.term], f.parameter)) fit.at_bound.push_back(f);
   return fit;
 }
 

@@ -65,8 +65,8 @@ LinearModel linearise(const Observations& observations, const MeanModel& model, 
 struct JointFit {
   MeanModel model;
   LinearModel linear;
-  NullFit variances;                  // with the model in
-  std::vector<std::string> at_bound;  // "creep of rotor 2 time_constant"
+  NullFit variances;  // with the model in
+  std::vector<ParameterPlace> at_bound;
   bool converged = true;
   bool settled = true;  // whether the last round of forces and parameters left both as they were
 };

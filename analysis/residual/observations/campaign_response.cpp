@@ -87,14 +87,43 @@ void set_response(const CampaignSource& source, const CampaignResponse& response
   result.y = result.value.cwiseQuotient(result.known);
 }
 
+namespace {
+
+/// Runs in which a rotor gives next to nothing, and not in others of their location.
+Index runs_without(const Observations& observations, Index rotor) {
+  constexpr double kNothing = 0.05;  // of the strongest rotor of the run
+  const Eigen::Array<bool, Eigen::Dynamic, 1> none =
+      observations.value.col(rotor).array().abs() <
+      kNothing * observations.value.array().rowwise().maxCoeff();
+  Index result = 0;
+  for (const auto& [location, runs] : places_of_each(observations.group))
+    if (const Index count = none(runs).count(); count < std::ssize(runs)) result += count;
+  return result;
+}
+
+}  // namespace
+
 void warn_of_unmeasured_rotors(Observations& observations) {
+  constexpr Index kOneOf = 25;  // fewer are set aside as gross
   if (observations.channels() < 2) return;
-  for (Index c = 0; c < observations.channels(); ++c)
-    if (observations.value.col(c).maxCoeff() == observations.value.col(c).minCoeff())
-      observations.left_out.push_back(fmt::format(
-          "the response {} of rotor {} is the same in every run, {:.4g} {}: it was not measured, and "
-          "what is said of that rotor is worth nothing",
-          observations.response, c + 1, observations.value(0, c), observations.unit));
+  for (Index c = 0; c < observations.channels(); ++c) {
+    const bool stuck = observations.value.col(c).maxCoeff() == observations.value.col(c).minCoeff();
+    const Index without = runs_without(observations, c);
+    if (!stuck && kOneOf * without <= observations.rows()) continue;
+    const std::string why =
+        stuck
+            ? fmt::format(
+                  "the response {} of rotor {} is the same in every run, {:.4g} {}: it was not measured, and "
+                  "what is said of that rotor is worth nothing",
+                  observations.response, c + 1, observations.value(0, c), observations.unit)
+            : fmt::format(
+                  "rotor {} gives next to nothing in {} runs, and not in others of their locations: it "
+                  "stood, "
+                  "or was not measured, and what is said of it is worth nothing",
+                  c + 1, without);
+    observations.unmeasured.emplace(c, why);
+    observations.left_out.push_back(why);
+  }
   constexpr double kRounding = 1e-9;
   const Eigen::ArrayXXd share =
       observations.value.array().colwise() / observations.value.rowwise().sum().array();

@@ -80,8 +80,16 @@ bool can_be_followed(const Observations& observations, const Covariate& covariat
 
 bool is_constant(const Covariate& covariate) {
   constexpr double kRounding = 1e-9;  // of the values: a range that is no more is none
-  const double range = covariate.value.maxCoeff() - covariate.value.minCoeff();
-  return range <= kRounding * covariate.value.cwiseAbs().maxCoeff();
+  const auto value = covariate.value.reshaped();
+  const Index known = value.array().isFinite().count();
+  if (known < value.size() && known > 0 && may_be_absent(covariate.name)) return false;
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double each : value) {
+    if (!std::isfinite(each)) continue;
+    low = std::min(low, each);
+    high = std::max(high, each);
+  }
+  return known == 0 || high - low <= kRounding * std::max(std::abs(low), std::abs(high));
 }
 
 double share_beside_cubics(const Observations& observations, const std::vector<int>& rows,
@@ -102,6 +110,12 @@ double share_beside_cubics(const Observations& observations, const std::vector<i
   const Eigen::VectorXd whole = columns.col(next);
   const Eigen::VectorXd left = whole - cubics * cubics.completeOrthogonalDecomposition().solve(whole);
   return whole.squaredNorm() > 0 ? left.squaredNorm() / whole.squaredNorm() : 0;
+}
+
+bool all_but_tells(const Observations& observations, const std::vector<int>& rows,
+                   const Eigen::VectorXd& condition, const Eigen::VectorXd& other) {
+  constexpr double kLittle = 0.02;  // of its variance
+  return share_beside_cubics(observations, rows, {condition(rows)}, other(rows)) < kLittle;
 }
 
 int places_on_range(const Covariate& covariate, const std::vector<int>& rows, int rotor) {

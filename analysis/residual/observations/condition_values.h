@@ -31,6 +31,11 @@ bool can_be_followed(const Observations& observations, const Covariate& covariat
 double share_beside_cubics(const Observations& observations, const std::vector<int>& rows,
                            const std::vector<Eigen::VectorXd>& conditions, const Eigen::VectorXd& column);
 
+/// Whether a cubic of one condition leaves next to nothing of another within the groups: beside each other,
+/// curves over the two could have any size. Of those that have a value for each row, not for each rotor.
+bool all_but_tells(const Observations& observations, const std::vector<int>& rows,
+                   const Eigen::VectorXd& condition, const Eigen::VectorXd& other);
+
 /// How many of the values that a rotor has in `rows` (−1: all of them) are at least a hundredth of the range
 /// apart: four speeds that scatter a little are four, and between them a wave has any height.
 int places_on_range(const Covariate& covariate, const std::vector<int>& rows, int rotor);

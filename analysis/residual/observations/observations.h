@@ -159,6 +159,7 @@ struct Observations {
   std::map<std::string, std::string> not_usable;    // covariate: why (missing in some runs, constant, a text)
   std::map<std::string, std::string> left_out_for;  // covariate: why runs are left out for it
   std::vector<std::string> left_out;                // "run: reason", and what else is wrong with runs
+  std::map<int, std::string> unmeasured;  // rotor, from 0, without a thrust in some runs: why, as said there
 
   /// v = b + g T of a cell, a linear baseline that is over what it is loaded with: what it reads without a
   /// load is no force. A thrust over a condition has none.

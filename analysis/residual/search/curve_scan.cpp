@@ -16,11 +16,9 @@ constexpr double kSpeedsApart = 0.5;
 /// Whether what it is over is all but told by what a found one is over: beside each other both could have any
 /// size.
 bool go_together(const SearchData& data, const Curve& found, const Curve& curve) {
-  constexpr double kLittle = 0.02;  // of its variance
   const bool comparable =
       found.x.cols() == 1 && curve.x.cols() == 1 && found.labels.empty() && curve.labels.empty();
-  return comparable && share_beside_cubics(data.observations(), data.rows(), {found.x(data.rows(), 0)},
-                                           curve.x(data.rows(), 0)) < kLittle;
+  return comparable && all_but_tells(data.observations(), data.rows(), found.x.col(0), curve.x.col(0));
 }
 
 /// Whether a curve over the same covariate and rotor is in, or over one that goes with it.

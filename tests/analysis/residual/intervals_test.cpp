@@ -45,6 +45,13 @@ struct Intervals : testing::Test {
     return static_cast<double>(held) / kSamples;
   }
 
+  /// Of groups whose values are 0, 1, 2 …
+  static ParameterEstimate median_of(int groups) {
+    std::vector<GroupEstimate> estimates;
+    for (int g = 0; g < groups; ++g) estimates.push_back({"", 1.0 * g, g - 0.1, g + 0.1});
+    return summary_of_groups({}, estimates);
+  }
+
   double coverage_of_median(int groups) {
     constexpr int kSamples = 2000;
     int held = 0;
@@ -161,6 +168,16 @@ TEST_F(Intervals, OfACurveHoldItsShape) {
       }
     }
     EXPECT_GT(held, 0.88 * points);
+  }
+}
+
+/// Half of n, and 1.96 times half of its root to either side.
+TEST_F(Intervals, OfTheMedianOfAnyNumberOfGroups) {
+  for (const int groups : {1000, 1100, 5000}) {
+    const ParameterEstimate median = median_of(groups);
+    const double half = 1.96 * std::sqrt(groups) / 2;
+    EXPECT_NEAR(median.low, groups / 2.0 - half, 1.5) << groups;
+    EXPECT_NEAR(median.high, groups / 2.0 + half, 1.5) << groups;
   }
 }
 

@@ -131,5 +131,26 @@ TEST_F(Products, OfConditionsThatGoTogetherAreNotTried) {
   EXPECT_GE(products, 2);
 }
 
+/// A cable comes loose in the midst of a campaign, and sags with the battery from then on: half of that over
+/// all runs is not what happened.
+TEST_F(Products, WhatOneConditionDoesFromSomeRunOnIsFound) {
+  constexpr int kCampaigns = 4;
+  int found = 0;
+  for (int i = 0; i < kCampaigns; ++i) {
+    Observations o = observations();
+    o.covariates.push_back(
+        {"run_order", VectorXd::LinSpaced(o.rows(), 1, static_cast<double>(o.rows())), true});
+    VectorXd late = from_mean(o, "supply_voltage_V");
+    late.head(late.size() / 2).setZero();
+    test::set_y(o, o.y.colwise() + 0.02 * late);
+    const Explanation e = explained(o);
+    EXPECT_NE(e.verdict, "explained") << explanation_text(e);
+    found += std::ranges::any_of(e.unknown, [](const UnknownStructure& unknown) {
+      return unknown.covariate == "supply_voltage_V" && unknown.times == "run_order";
+    });
+  }
+  EXPECT_GE(found, kCampaigns - 1);
+}
+
 }  // namespace
 }  // namespace tunnelrig

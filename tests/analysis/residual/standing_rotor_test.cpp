@@ -53,6 +53,20 @@ TEST_F(StandingRotor, ARotorThatAlwaysReadsTheSameIsSaid) {
   explained();
   EXPECT_THAT(warnings, HasSubstr("thrust of rotor 1 is the same in every run, 0 N"));
   EXPECT_THAT(warnings, Not(HasSubstr("of rotor 2 is the same")));
+  const ProgramResult adopted = run("explain --db c.db --simulations 199 --adopt");
+  EXPECT_EQ(adopted.code, 2);
+  EXPECT_THAT(adopted.error, HasSubstr("--adopt: the response thrust of rotor 1 is the same in every run"));
+}
+
+/// Nobody is to make a thrust of what a rotor that has stopped gives.
+TEST_F(StandingRotor, ARotorThatStopsIsSaidAndNotCorrected) {
+  write_campaign(10, "", [](SimulatedRun& run) {
+    if (run.session > 5) run.first_rotor_factor = 0.004;
+  });
+  import_campaign();
+  explained();
+  EXPECT_THAT(warnings, HasSubstr("rotor 1 gives next to nothing in"));
+  EXPECT_THAT(run("explain --db c.db --adopt").error, HasSubstr("--adopt: rotor 1 gives next to nothing in"));
 }
 
 }  // namespace

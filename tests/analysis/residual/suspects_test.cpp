@@ -143,6 +143,7 @@ struct HeldOutRows : testing::Test {
   std::mt19937_64 random{test::seed()};
   Observations table = test::simulate({.runs_of_block = std::vector<int>(10, 8)}, random);
   HeldOutErrors sealed;
+  MeanModel model;
 
   HeldOutRows() {
     table.from_table = true;
@@ -152,7 +153,7 @@ struct HeldOutRows : testing::Test {
   }
   std::vector<std::string> apart() const {
     std::vector<std::string> rows;
-    for (const SuspectRow& row : apart_from_their_block(table, sealed)) rows.push_back(row.row);
+    for (const SuspectRow& row : apart_from_their_block(table, model, sealed)) rows.push_back(row.row);
     return rows;
   }
 };
@@ -188,6 +189,16 @@ TEST(RepeatedRows, AreAConditionAndNoErrors) {
   EXPECT_EQ(gross_rows(table, suspects).size(), 3u) << "the two on the other side repeat nothing";
 }
 
+/// A curve stays as it was at its end, and what it is over may do more.
+TEST_F(HeldOutRows, AreNotWrongBeyondWhatACurveHasSeen) {
+  sealed.error(17, 0) = 0.9;
+  Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(table.rows(), 0, 1);
+  model.curves.push_back({.covariate = "x", .columns = {}, .x = x, .low = 0, .high = 1});
+  EXPECT_THAT(apart(), testing::ElementsAre(table.name[17]));
+  model.curves[0].x(17, 0) = 1.1;
+  EXPECT_THAT(apart(), testing::IsEmpty());
+}
+
 TEST_F(HeldOutRows, AreNotWrongWhereTheirBlockIsElsewhere) {
   for (int row = 16; row < 24; ++row) sealed.error(row, 0) = 0.9;
   EXPECT_THAT(apart(), testing::IsEmpty());
@@ -217,6 +228,54 @@ TEST_F(Mistyped, ManyRunsThatAreFarOffStayAndAreSaid) {
   const Explanation e = test::explained(o);
   EXPECT_FALSE(std::ranges::any_of(e.suspect_rows, &SuspectRow::set_aside));
   EXPECT_THAT(e.warnings, Contains(HasSubstr("6 runs are far off, more than are set aside (5 at most)")));
+}
+
+struct LoneRows : test::TablesTest {
+  /// Thrusts by voltage, one of them at 6 V; `factor` multiplies that.
+  Explanation explained(double factor) {
+    std::string csv = "b,V,y\n";
+    for (int r = 0; r < 96; ++r) {
+      const double volts = r == 22 ? 6 : 10.5 + 2 * even(random);
+      csv += fmt::format("{},{},{}\n", r / 8, volts,
+                         (r == 22 ? factor : 1) * 8 * std::pow(volts / test::kMiddle_V, 1.7) *
+                             (1 + 0.003 * scatter(random)));
+    }
+    return test::explained(
+        observed(csv,
+                 "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n"
+                 "[[covariates]]\ncolumn = \"V\"\nunit = \"V\"\nmeaning = \"supply_voltage_V\"\n"));
+  }
+};
+
+/// The baseline leaves it as far from all others as a typing error.
+TEST_F(LoneRows, ThatTheEffectsOfTheOthersPredictStay) {
+  const Explanation e = explained(1);
+  EXPECT_EQ(names(e), "supply_voltage ");
+  EXPECT_FALSE(std::ranges::any_of(e.suspect_rows, &SuspectRow::set_aside)) << explanation_text(e);
+  EXPECT_EQ(e.runs, 96);
+}
+
+TEST_F(LoneRows, ThatTheyDoNotPredictAreSetAside) {
+  const Explanation e = explained(3);
+  EXPECT_EQ(names(e), "supply_voltage ");
+  ASSERT_EQ(std::ranges::count_if(e.suspect_rows, &SuspectRow::set_aside), 1) << explanation_text(e);
+  EXPECT_EQ(e.suspect_rows[0].row, "t.csv:24");
+}
+
+/// What is left has to differ, and to have a row that the table holds out.
+TEST_F(LoneRows, ThatAllRestsUponStay) {
+  std::string csv = "b,held,y\n";
+  for (int r = 0; r < 96; ++r)
+    csv +=
+        fmt::format("{},{},{}\n", r / 8, r == 22 ? 1 : 0, (r == 22 ? 30 : 8) * (1 + 0.003 * scatter(random)));
+  const std::string response = "[response]\ncolumn = \"y\"\nunit = \"N\"\nmeaning = \"thrust_N\"\n";
+  Explanation e = test::explained(observed(csv, "blocks = \"b\"\nhold_out = \"held == 1\"\n" + response));
+  EXPECT_FALSE(std::ranges::any_of(e.suspect_rows, &SuspectRow::set_aside)) << explanation_text(e);
+  EXPECT_GT(e.before.held_out_rmse, 10);
+  csv = "b,y\n";
+  for (int r = 0; r < 96; ++r) csv += fmt::format("{},{}\n", r / 8, r == 22 ? 30 : 8);
+  e = test::explained(observed(csv, "blocks = \"b\"\n" + response));
+  EXPECT_EQ(e.runs, 96);
 }
 
 }  // namespace

@@ -113,6 +113,18 @@ TEST(Doubts, AFloorFarAboveTheErrorIsSaid) {
   EXPECT_THAT(warnings_at(1.5, 100), testing::Not(Contains(HasSubstr("floor"))));
 }
 
+/// Only what was held out had another oil.
+TEST_F(TableDoubts, AConditionThatTheOpenRowsDoNotShowIsSaid) {
+  std::string csv = "set,oil,y\n";
+  for (int r = 0; r < 96; ++r)
+    csv += fmt::format("{},{},{}\n", r / 8, r > 71 && r % 2 == 0 ? 2 : 1, 3 * (1 + 0.01 * scatter(random)));
+  const Explanation e = explained(
+      observed(csv,
+               "blocks = \"set\"\nhold_out = \"set > 8\"\n[response]\ncolumn = \"y\"\nunit = \"N m\"\n"
+               "[[covariates]]\ncolumn = \"oil\"\nunit = \"1\"\n"));
+  EXPECT_THAT(e.warnings, Contains(HasSubstr("oil is the same in every open row: nothing can be found")));
+}
+
 /// One gust in which one row is far off tells nothing of what wind does, whichever rows are held out.
 TEST_F(TableDoubts, OneRunFarOutOnACondition) {
   constexpr int kTables = 12;
@@ -161,6 +173,24 @@ TEST_F(TableDoubts, WhatOneBlockAloneShowsIsNoDependence) {
   }
   EXPECT_LE(claimed, 3);
   EXPECT_GE(said, kTables - 4);
+}
+
+/// Days that differ by 0.3 %, and one that was something else.
+TEST(Doubts, ABlockFarFromTheOthersIsNamed) {
+  std::mt19937_64 random{test::seed()};
+  Observations o = test::four_rotors(4, 0.002, random);
+  EXPECT_THAT(explained(o).warnings, testing::Not(Contains(HasSubstr("let expect"))));
+  Eigen::MatrixXd y = o.y;
+  for (Eigen::Index run = 0; run < o.rows(); ++run) {
+    if (o.block[static_cast<std::size_t>(run)] == 5) y.row(run).array() += 0.05;
+    if (o.block[static_cast<std::size_t>(run)] == 9) y(run, 2) -= 0.06;
+  }
+  test::set_y(o, y);
+  const Explanation e = explained(o);
+  EXPECT_THAT(e.warnings, Contains(testing::AllOf(HasSubstr("session " + o.block_name[5] + " is"),
+                                                  HasSubstr("% above what the others let expect"))));
+  EXPECT_THAT(e.warnings, Contains(testing::AllOf(HasSubstr("rotor 3 of session " + o.block_name[9] + " is"),
+                                                  HasSubstr("% below what the others let expect"))));
 }
 
 }  // namespace
