@@ -120,10 +120,12 @@ void estimate_on_all(const Models& models, const Observations& observations,
     explanation.unknown.push_back(
         describe_sessions(observations, fitted.error, *found.session_unknown, rows));
   for (const SuspectRow& row :
-       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows)))
-    if (std::ranges::find(explanation.suspect_rows, row.row, &SuspectRow::row) ==
-        explanation.suspect_rows.end())
+       suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows))) {
+    const bool said = std::ranges::count(explanation.suspect_rows, row.row, &SuspectRow::row) > 0;
+    const auto place = std::ranges::find(wide.name, row.row) - wide.name.begin();
+    if (!said && !is_beyond_a_curve(whole.model, static_cast<int>(place)))
       explanation.suspect_rows.push_back(row);
+  }
   found.of_one_block.insert(found.of_one_block.end(), left.of_one_block.begin(), left.of_one_block.end());
   warn_of_single_blocks(observations, found.of_one_block, explanation);
   warn_of_odd_blocks(observations, explanation);

@@ -195,10 +195,13 @@ double sigma_by_median(const Eigen::VectorXd& sizes);
 std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,
                                      const NullFit& variances, double dof);
 
+/// Whether a row lies where a curve of the model has not been: it stays there as it was at its end, and
+/// nothing says that it is the row that is wrong.
+bool is_beyond_a_curve(const MeanModel& model, int row);
+
 /// Rows that were held out, and are far from what was predicted for them while the rest of their block is
 /// not, in σ by the median: a fit with them in bends to them. Of predictions beyond what a table holds out by
-/// name, or of blocks of one row, nothing says that it is the row that is wrong; nor of those beyond the rows
-/// that one of the model's curves was seen in.
+/// name, or of blocks of one row, nothing says that it is the row that is wrong.
 std::vector<SuspectRow> apart_from_their_block(const Observations& observations, const MeanModel& model,
                                                const HeldOutErrors& sealed);
 

@@ -119,7 +119,8 @@ MatrixXd share_left(const Observations& observations, const HeldOutErrors& error
   return (2 - (errors.expected_std.array() / unit.array()).square() / sigma2.array()).cwiseMax(kLeast);
 }
 
-/// Whether a row lies where a curve of the model has not been: it stays there as it was at its end.
+}  // namespace
+
 bool is_beyond_a_curve(const MeanModel& model, int row) {
   return std::ranges::any_of(model.curves, [&](const Curve& curve) {
     if (curve.x.size() == 0 || curve.shape == CurveShape::kLevels) return false;
@@ -127,8 +128,6 @@ bool is_beyond_a_curve(const MeanModel& model, int row) {
     return (x < curve.low || x > curve.high).any();
   });
 }
-
-}  // namespace
 
 std::vector<SuspectRow> apart_from_their_block(const Observations& observations, const MeanModel& model,
                                                const HeldOutErrors& sealed) {
