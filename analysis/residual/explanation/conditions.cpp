@@ -226,7 +226,7 @@ void warn_of_scatter(const Observations& observations, Explanation& explanation)
     if (correlation == 0) continue;
     explanation.warnings.push_back(
         fmt::format("neighbouring {} resemble each other (correlation {:.2f}{}{}): allowed for",
-                    observations.channels() > 1 ? "runs" : "rows", correlation,
+                    observations.from_table ? "rows" : "runs", correlation,
                     observations.channels() > 1 ? " of " : "", observations.channels() > 1 ? kOf[s] : ""));
   }
 }

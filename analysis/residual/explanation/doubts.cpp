@@ -308,7 +308,7 @@ void warn_of_odd_blocks(const Observations& observations, Explanation& explanati
     if (!(sigma > 0) || !(away.cwiseAbs().maxCoeff(&block) > kFar * sigma)) return;
     const double scale = observations.multiplicative ? 100 : observations.response_per_y();
     explanation.warnings.push_back(fmt::format(
-        "{}{} {} is {:.2g}{} {} what the others let expect, {:.0f} times what these differ by: something was "
+        "{}{} {} is {:.3g}{} {} what the others let expect, {:.0f} times what these differ by: something was "
         "special there; leave it out to see what it hides",
         of_rotor, block_noun(observations), observations.block_name[static_cast<std::size_t>(block)],
         std::abs(away(block)) * scale, observations.multiplicative ? " %" : explanation.unit_suffix(),

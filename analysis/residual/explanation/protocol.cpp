@@ -127,9 +127,10 @@ void explain_too_few(const Observations& observations, const SearchSettings& set
   explanation.verdict = "insufficient";
 }
 
-std::string only_sealed_in_words(const std::vector<std::string>& groups) {
+std::string only_sealed_in_words(const Observations& observations, const std::vector<std::string>& groups) {
   constexpr std::size_t kNamed = 5;
-  return "runs in sealed blocks only, so not scored: " + first_few(groups, kNamed);
+  return fmt::format("{} in sealed blocks only, so not scored: {}", observations.from_table ? "rows" : "runs",
+                     first_few(groups, kNamed));
 }
 
 /// What every explanation says first.
@@ -286,7 +287,7 @@ Explanation explain_once(const Observations& observations, const std::vector<con
   }
   const bool own_baselines = observations.groups_within_blocks || !observations.held_out.empty();
   if (!seal.only_sealed.empty() && !own_baselines)
-    explanation.warnings.push_back(only_sealed_in_words(seal.only_sealed));
+    explanation.warnings.push_back(only_sealed_in_words(observations, seal.only_sealed));
   const Attribution found = attribute(observations, seal.open, effects, settings);
   // What the baseline is held against: the same, without what groups have of their own.
   Observations alone = observations;

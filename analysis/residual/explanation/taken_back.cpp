@@ -1,7 +1,9 @@
 // Names that the opened seal refutes, and the protocol done again without them.
 #include "analysis/residual/explanation/explanation_parts.h"
+#include "calibration/distributions.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <utility>
 
@@ -50,6 +52,14 @@ bool baseline_does_better(const Explanation& explanation) {
 }
 
 bool holds_0(const auto& estimate) { return estimate.low <= 0 && estimate.high >= 0; }
+
+/// Whether amplitudes of the groups' own, of either sign, are all 0 as far as their 95 % intervals tell.
+bool are_nothing(const std::vector<GroupEstimate>& groups) {
+  double squares = 0;
+  for (const GroupEstimate& group : groups)
+    squares += std::pow((group.low + group.high) / (group.high - group.low), 2);
+  return squares * chi2_quantile(0.95, 1) <= chi2_quantile(0.95, static_cast<double>(groups.size()));
+}
 
 /// Curves of the model over an effect's own conditions.
 std::vector<const UnknownStructure*> curves_beside(const AdoptedEffect& adopted,
@@ -242,12 +252,12 @@ std::string refutation(const AdoptedEffect& adopted, const Observations& observa
     if (by.empty()) by = {"the force"};
     return fmt::format("what goes with {} bends away from its formula", fmt::join(by, ", "));
   }
-  // Where groups have their own, these may be of either sign, and nothing on the whole.
-  const bool nothing =
-      adopted.term.per_group
-          ? std::ranges::all_of(amplitude.groups, [](const auto& group) { return holds_0(group); })
-          : holds_0(amplitude);
-  return nothing ? fmt::format("the 95 % interval of its {} holds 0", amplitude.name) : "";
+  if (adopted.term.per_group)
+    return are_nothing(amplitude.groups)
+               ? fmt::format("the {}s of its groups are no further from 0 than their intervals let expect",
+                             amplitude.name)
+               : "";
+  return holds_0(amplitude) ? fmt::format("the 95 % interval of its {} holds 0", amplitude.name) : "";
 }
 
 }  // namespace tunnelrig
