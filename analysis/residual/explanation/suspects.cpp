@@ -1,5 +1,6 @@
 // Rows that do not belong to the others.
 #include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/likelihood/scores.h"
 #include "analysis/upper_median.h"
 #include "calibration/distributions.h"
 

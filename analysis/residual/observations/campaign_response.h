@@ -17,7 +17,7 @@ struct CampaignSource {
   const Reduction& reduction;
   std::vector<std::size_t> order;  // of reduction.runs, by time
 
-  Eigen::Index rows() const { return static_cast<Index>(order.size()); }
+  Eigen::Index rows() const { return static_cast<Eigen::Index>(order.size()); }
   const RunCoefficients& coefficients(Eigen::Index row) const {
     return reduction.runs[order[static_cast<std::size_t>(row)]];
   }
