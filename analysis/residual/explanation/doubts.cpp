@@ -7,8 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
@@ -276,16 +276,29 @@ void warn_of_single_blocks(const Observations& observations, const std::vector<O
 
 namespace {
 
-/// Of the rows' deviations, the mean of each block; a block without any has 0.
-VectorXd means_of_blocks(const Observations& observations, const VectorXd& deviation) {
-  VectorXd means = VectorXd::Zero(observations.blocks());
-  for (const auto& [block, rows] : places_of_each(observations.block)) {
-    std::vector<Index> known;
-    std::ranges::copy_if(rows, std::back_inserter(known),
-                         [&](Index row) { return std::isfinite(deviation(row)); });
-    if (!known.empty()) means(block) = deviation(known).mean();
+/// The block whose mean is farthest from the others'.
+struct OddBlock {
+  int block;
+  double away, of_spread;  // from the blocks' median; over what blocks of as many rows scatter by
+};
+
+std::optional<OddBlock> oddest_block(const Observations& observations, const VectorXd& deviation) {
+  const auto blocks = places_of_each(observations.block);
+  VectorXd means(std::ssize(blocks)), within = VectorXd::Zero(deviation.size());
+  for (Index at = 0; const auto& [block, rows] : blocks) {
+    means(at) = deviation(rows).mean();
+    within(rows) = deviation(rows).array() - means(at++);
   }
-  return means;
+  const VectorXd away = means.array() - upper_median({means.begin(), means.end()});
+  const double of_blocks = sigma_by_median(away.cwiseAbs()), of_rows = sigma_by_median(within.cwiseAbs());
+  std::optional<OddBlock> oddest;
+  for (Index at = 0; const auto& [block, rows] : blocks) {
+    const double spread = std::max(of_blocks, of_rows / std::sqrt(static_cast<double>(rows.size())));
+    const double of_spread = spread > 0 ? std::abs(away(at)) / spread : 0;
+    if (!oddest || of_spread > oddest->of_spread) oddest = {block, away(at), of_spread};
+    ++at;
+  }
+  return oddest;
 }
 
 }  // namespace
@@ -299,21 +312,19 @@ void warn_of_odd_blocks(const Observations& observations, Explanation& explanati
     return;
   Eigen::MatrixXd error = -explanation.residual_after;  // measured less predicted
   if (observations.multiplicative) error = error.cwiseQuotient(observations.value);
-  const VectorXd common = error.rowwise().mean();
+  error = error.array().isNaN().select(0, error);
   const auto consider = [&](const VectorXd& deviation, const std::string& of_rotor) {
-    const VectorXd means = means_of_blocks(observations, deviation);
-    const VectorXd away = means.array() - upper_median({means.begin(), means.end()});
-    const double sigma = sigma_by_median(away.cwiseAbs());
-    Index block = 0;
-    if (!(sigma > 0) || !(away.cwiseAbs().maxCoeff(&block) > kFar * sigma)) return;
-    const double scale = observations.multiplicative ? 100 : observations.response_per_y();
+    const std::optional<OddBlock> odd = oddest_block(observations, deviation);
+    if (!odd || !(odd->of_spread > kFar)) return;
     explanation.warnings.push_back(fmt::format(
         "{}{} {} is {:.3g}{} {} what the others let expect, {:.0f} times what these differ by: something was "
         "special there; leave it out to see what it hides",
-        of_rotor, block_noun(observations), observations.block_name[static_cast<std::size_t>(block)],
-        std::abs(away(block)) * scale, observations.multiplicative ? " %" : explanation.unit_suffix(),
-        away(block) > 0 ? "above" : "below", std::abs(away(block)) / sigma));
+        of_rotor, block_noun(observations), observations.block_name[static_cast<std::size_t>(odd->block)],
+        std::abs(odd->away) * (observations.multiplicative ? 100 : 1),
+        observations.multiplicative ? " %" : explanation.unit_suffix(), odd->away > 0 ? "above" : "below",
+        odd->of_spread));
   };
+  const VectorXd common = error.rowwise().mean();
   consider(common, "");
   for (Index c = 0; c < error.cols() && error.cols() > 2; ++c)
     consider(error.col(c) - common, fmt::format("rotor {} of ", c + 1));

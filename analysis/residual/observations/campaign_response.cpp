@@ -111,16 +111,14 @@ void warn_of_unmeasured_rotors(Observations& observations) {
     const Index without = runs_without(observations, c);
     if (!stuck && kOneOf * without <= observations.rows()) continue;
     const std::string why =
-        stuck
-            ? fmt::format(
-                  "the response {} of rotor {} is the same in every run, {:.4g} {}: it was not measured, and "
-                  "what is said of that rotor is worth nothing",
-                  observations.response, c + 1, observations.value(0, c), observations.unit)
-            : fmt::format(
-                  "rotor {} gives next to nothing in {} runs, and not in others of their locations: it "
-                  "stood, "
-                  "or was not measured, and what is said of it is worth nothing",
-                  c + 1, without);
+        stuck ? fmt::format(
+                    "the response {} of rotor {} is the same in every run, {:.4g} {}: it was not "
+                    "measured, and what is said of that rotor is worth nothing",
+                    observations.response, c + 1, observations.value(0, c), observations.unit)
+              : fmt::format(
+                    "rotor {} gives next to nothing in {} runs, and not in others of their locations: "
+                    "it stood, or was not measured, and what is said of it is worth nothing",
+                    c + 1, without);
     observations.unmeasured.emplace(c, why);
     observations.left_out.push_back(why);
   }

@@ -193,5 +193,24 @@ TEST(Doubts, ABlockFarFromTheOthersIsNamed) {
                                                   HasSubstr("% below what the others let expect"))));
 }
 
+/// A day of a single run scatters more than days of twenty.
+TEST(Doubts, ABlockOfOneRunIsNoOddOne) {
+  constexpr int kCampaigns = 200;
+  std::mt19937_64 random{test::seed()};
+  std::normal_distribution<double> normal;
+  std::vector<int> runs(16, 20);
+  runs[3] = runs[9] = 1;
+  const Observations o = test::simulate({.runs_of_block = runs}, random);
+  int named = 0;
+  for (int i = 0; i < kCampaigns; ++i) {
+    Explanation e;
+    e.residual_after = o.value;
+    for (double& each : e.residual_after.reshaped()) each *= 0.01 * normal(random);
+    warn_of_odd_blocks(o, e);
+    named += e.warnings.empty() ? 0 : 1;
+  }
+  EXPECT_LE(named, 2);
+}
+
 }  // namespace
 }  // namespace tunnelrig
