@@ -200,7 +200,7 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
   explanation = without_names_of_incomplete(std::move(explanation), aside.kept, left, unrefuted, said);
   explanation.seal_chose = explanation.seal_chose && !explanation.adopted.empty();
   if (explanation.seal_chose)
-    said.push_back(
+    said.emplace_back(
         "the sealed blocks had a part in what is adopted: their error after is no longer one of "
         "blocks that nobody has looked at");
   explanation.warnings.insert(explanation.warnings.begin(), said.begin(), said.end());

@@ -246,7 +246,7 @@ std::string refutation(const AdoptedEffect& adopted, const Observations& observa
     if (bounds.role == ParameterRole::kShape && shape.low <= bounds.lower && shape.high >= bounds.upper)
       return fmt::format("its {} may be anything within its bounds", shape.name);
   }
-  if (const std::string line = no_more_than_a_line(adopted, observations); !line.empty()) return line;
+  if (std::string line = no_more_than_a_line(adopted, observations); !line.empty()) return line;
   if (adopted.bends_away) {
     std::vector<std::string> by = own_conditions(*adopted.term.effect, observations);
     if (by.empty()) by = {"the force"};
