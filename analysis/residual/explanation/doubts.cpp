@@ -278,11 +278,11 @@ namespace {
 
 /// The block whose mean is farthest from the others'.
 struct OddBlock {
-  int block;
-  double away, of_spread;  // from the blocks' median; over what blocks of as many rows scatter by
+  int block = 0;
+  double away = 0, of_spread = 0;  // from the blocks' median; over what blocks of as many rows scatter by
 };
 
-std::optional<OddBlock> oddest_block(const Observations& observations, const VectorXd& deviation) {
+OddBlock oddest_block(const Observations& observations, const VectorXd& deviation) {
   const auto blocks = places_of_each(observations.block);
   VectorXd means(std::ssize(blocks)), within = VectorXd::Zero(deviation.size());
   for (Index at = 0; const auto& [block, rows] : blocks) {
@@ -291,11 +291,11 @@ std::optional<OddBlock> oddest_block(const Observations& observations, const Vec
   }
   const VectorXd away = means.array() - upper_median({means.begin(), means.end()});
   const double of_blocks = sigma_by_median(away.cwiseAbs()), of_rows = sigma_by_median(within.cwiseAbs());
-  std::optional<OddBlock> oddest;
+  OddBlock oddest;
   for (Index at = 0; const auto& [block, rows] : blocks) {
     const double spread = std::max(of_blocks, of_rows / std::sqrt(static_cast<double>(rows.size())));
     const double of_spread = spread > 0 ? std::abs(away(at)) / spread : 0;
-    if (!oddest || of_spread > oddest->of_spread) oddest = {block, away(at), of_spread};
+    if (of_spread > oddest.of_spread) oddest = {block, away(at), of_spread};
     ++at;
   }
   return oddest;
@@ -314,15 +314,15 @@ void warn_of_odd_blocks(const Observations& observations, Explanation& explanati
   if (observations.multiplicative) error = error.cwiseQuotient(observations.value);
   error = error.array().isNaN().select(0, error);
   const auto consider = [&](const VectorXd& deviation, const std::string& of_rotor) {
-    const std::optional<OddBlock> odd = oddest_block(observations, deviation);
-    if (!odd || !(odd->of_spread > kFar)) return;
+    const OddBlock odd = oddest_block(observations, deviation);
+    if (!(odd.of_spread > kFar)) return;
     explanation.warnings.push_back(fmt::format(
         "{}{} {} is {:.3g}{} {} what the others let expect, {:.0f} times what these differ by: something was "
         "special there; leave it out to see what it hides",
-        of_rotor, block_noun(observations), observations.block_name[static_cast<std::size_t>(odd->block)],
-        std::abs(odd->away) * (observations.multiplicative ? 100 : 1),
-        observations.multiplicative ? " %" : explanation.unit_suffix(), odd->away > 0 ? "above" : "below",
-        odd->of_spread));
+        of_rotor, block_noun(observations), observations.block_name[static_cast<std::size_t>(odd.block)],
+        std::abs(odd.away) * (observations.multiplicative ? 100 : 1),
+        observations.multiplicative ? " %" : explanation.unit_suffix(), odd.away > 0 ? "above" : "below",
+        odd.of_spread));
   };
   const VectorXd common = error.rowwise().mean();
   consider(common, "");

@@ -122,8 +122,7 @@ void estimate_on_all(const Models& models, const Observations& observations,
   for (const SuspectRow& row :
        suspect_rows(wide, fitted, whole.variances, degrees_of_freedom(wide, whole, rows))) {
     const bool said = std::ranges::count(explanation.suspect_rows, row.row, &SuspectRow::row) > 0;
-    const auto place = std::ranges::find(wide.name, row.row) - wide.name.begin();
-    if (!said && !is_beyond_a_curve(whole.model, static_cast<int>(place)))
+    if (!said && !is_beyond_a_curve(whole.model, place_of(wide, row.row)))
       explanation.suspect_rows.push_back(row);
   }
   found.of_one_block.insert(found.of_one_block.end(), left.of_one_block.begin(), left.of_one_block.end());

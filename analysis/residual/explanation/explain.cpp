@@ -65,9 +65,9 @@ bool is_predicted(const Observations& observations, const SuspectRow& row, const
   if (model.terms.empty() || !model.curves.empty() || std::ranges::any_of(model.terms, goes_by_other_rows))
     return false;
   const std::vector<int> others = rows_but(observations, {row});
-  const auto place = std::ranges::find(observations.name, row.row) - observations.name.begin();
   const auto error_of = [&](const MeanModel& tried) {
-    return score(observations, fit_jointly(observations, tried, others), others, {static_cast<int>(place)});
+    return score(observations, fit_jointly(observations, tried, others), others,
+                 {place_of(observations, row.row)});
   };
   const HeldOutErrors with = error_of(model), without = error_of({});
   const double error = std::abs(with.error(0, 0));

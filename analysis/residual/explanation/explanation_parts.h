@@ -190,6 +190,9 @@ double degrees_of_freedom(const Observations& observations, const JointFit& fit,
 /// it. 0 where none says anything.
 double sigma_by_median(const Eigen::VectorXd& sizes);
 
+/// Where a row stands among those of the observations.
+int place_of(const Observations& observations, const std::string& row);
+
 /// Rows whose externally studentised residual is beyond what n normal ones reach once in a hundred data sets.
 /// `errors` are of the fitted rows: their variance is σ²(1 − h), where expected_std has σ²(1 + h).
 std::vector<SuspectRow> suspect_rows(const Observations& observations, const HeldOutErrors& errors,

@@ -45,7 +45,7 @@ Observations with_all(const Observations& observations, const std::vector<std::s
   for (const int row : observations.all_rows())
     if (has_all(observations, row, names)) rows.push_back(row);
   Observations complete = observations.subset(rows);
-  if (const bool declared = !observations.held_out.empty(); declared) {
+  if (!observations.held_out.empty()) {
     const Seal there = seal_blocks(complete, 0);
     if (!can_be_scored(complete, there, there.sealed)) {
       complete = complete.subset(there.open);

@@ -27,6 +27,10 @@ double degrees_of_freedom(const Observations& observations, const JointFit& fit,
   return static_cast<double>(std::max<Index>(dof, 2));
 }
 
+int place_of(const Observations& observations, const std::string& row) {
+  return static_cast<int>(std::ranges::find(observations.name, row) - observations.name.begin());
+}
+
 double sigma_by_median(const VectorXd& sizes) {
   constexpr double kMedianOfNormal = 0.6745;
   std::vector<double> deviations(sizes.begin(), sizes.end());
@@ -293,19 +297,17 @@ bool repeat_each_other(const Observations& observations, const SuspectRow& row,
                        const std::vector<SuspectRow>& gross) {
   constexpr double kSame = 0.02;  // of the condition's range
   constexpr std::ptrdiff_t kFewest = 3;
-  const auto place_of = [&](const SuspectRow& of) {
-    return static_cast<Index>(std::ranges::find(observations.name, of.row) - observations.name.begin());
-  };
   return std::ranges::any_of(observations.covariates, [&](const Covariate& covariate) {
     if (covariate.derived || covariate.per_channel() || covariate.name == "run_order" ||
         !covariate.value.allFinite())
       return false;
     const double least = kSame * (covariate.value.maxCoeff() - covariate.value.minCoeff());
-    const double own = covariate.value(place_of(row), 0);
+    const double own = covariate.value(place_of(observations, row.row), 0);
     const auto is_near = [&](double value) { return std::abs(value - own) <= least; };
     const std::ptrdiff_t near = std::ranges::count_if(covariate.value.col(0), is_near);
     const std::ptrdiff_t alike = std::ranges::count_if(gross, [&](const SuspectRow& other) {
-      return is_near(covariate.value(place_of(other), 0)) && row.studentised * other.studentised > 0;
+      return is_near(covariate.value(place_of(observations, other.row), 0)) &&
+             row.studentised * other.studentised > 0;
     });
     return alike >= kFewest && 2 * alike > near && near < observations.rows() / 2;
   });
@@ -371,8 +373,7 @@ std::vector<IsolatedValue> mistyped_values(const Observations& observations) {
   constexpr double kARangeAway = 1, kFarOff = 10;
   const VectorXd away = common_distance(observations);
   const auto is_far_off = [&](const IsolatedValue& value) {
-    const auto run = std::find(observations.name.begin(), observations.name.end(), value.row);
-    return std::abs(away(run - observations.name.begin())) > kFarOff;
+    return std::abs(away(place_of(observations, value.row))) > kFarOff;
   };
   std::vector<IsolatedValue> result;
   for (const IsolatedValue& value : isolated_values(observations))
