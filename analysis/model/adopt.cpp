@@ -111,8 +111,8 @@ void require_adoptable(const Observations& observations) {
         "the errors are the same, with --adopt-empirical those with the curves",
         observations.response, observations.campaign.empty() ? "a table" : observations.campaign));
   // What all rotors have in common is of this one as well.
-  for (const auto& [rotor, why] : observations.unmeasured)
-    throw InputError("--adopt: " + why + "; a model would make a thrust of it");
+  if (!observations.unmeasured.empty())
+    throw InputError("--adopt: " + observations.unmeasured.front() + "; a model would make a thrust of it");
 }
 
 Adoption adopt(const Observations& observations, const Explanation& explanation, bool empirical) {

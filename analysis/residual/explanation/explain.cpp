@@ -11,8 +11,7 @@
 namespace tunnelrig {
 namespace {
 
-constexpr std::size_t kRunsPerGross = 25;  // what touches more runs of a campaign is no slip of the hand
-constexpr int kMostSearches = 2;           // after the first, each without the gross rows of the one before
+constexpr int kMostSearches = 2;  // after the first, each without the gross rows of the one before
 
 std::vector<int> rows_but(const Observations& observations, const std::vector<SuspectRow>& left_out) {
   std::vector<int> rows;

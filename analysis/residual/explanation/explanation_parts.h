@@ -180,8 +180,6 @@ UnknownStructure describe_sessions(const Observations& observations, const Eigen
 
 // --- suspects.cpp
 
-inline constexpr std::size_t kRowsPerGross = 10;  // of a table: at most one row of ten is set aside
-
 double degrees_of_freedom(const Observations& observations, const JointFit& fit,
                           const std::vector<int>& rows);
 

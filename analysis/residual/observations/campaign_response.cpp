@@ -104,12 +104,11 @@ Index runs_without(const Observations& observations, Index rotor) {
 }  // namespace
 
 void warn_of_unmeasured_rotors(Observations& observations) {
-  constexpr Index kOneOf = 25;  // fewer are set aside as gross
   if (observations.channels() < 2) return;
   for (Index c = 0; c < observations.channels(); ++c) {
     const bool stuck = observations.value.col(c).maxCoeff() == observations.value.col(c).minCoeff();
-    const Index without = runs_without(observations, c);
-    if (!stuck && kOneOf * without <= observations.rows()) continue;
+    const auto without = static_cast<std::size_t>(runs_without(observations, c));
+    if (!stuck && kRunsPerGross * without <= observations.name.size()) continue;  // fewer are set aside
     const std::string why =
         stuck ? fmt::format(
                     "the response {} of rotor {} is the same in every run, {:.4g} {}: it was not "
@@ -119,7 +118,7 @@ void warn_of_unmeasured_rotors(Observations& observations) {
                     "rotor {} gives next to nothing in {} runs, and not in others of their locations: "
                     "it stood, or was not measured, and what is said of it is worth nothing",
                     c + 1, without);
-    observations.unmeasured.emplace(c, why);
+    observations.unmeasured.push_back(why);
     observations.left_out.push_back(why);
   }
   constexpr double kRounding = 1e-9;

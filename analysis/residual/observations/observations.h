@@ -44,6 +44,8 @@ inline constexpr std::string_view kGroundDistance = "ground_distance_R",
                                   kCeilingDistance = "ceiling_distance_R",
                                   kDiameter = "propeller_diameter_m";  // of a table's propellers
 inline constexpr double kLargestResponse = 1e100;  // squares of larger ones, summed, are no numbers
+inline constexpr std::size_t kRunsPerGross = 25,
+                             kRowsPerGross = 10;              // what touches more is no slip of the hand
 inline constexpr const char* kConstantBaseline = "constant";  // a table's, where nothing else is said
 
 /// A place without ground or ceiling has no distance to it, and what depends on the distance is absent there.
@@ -159,7 +161,7 @@ struct Observations {
   std::map<std::string, std::string> not_usable;    // covariate: why (missing in some runs, constant, a text)
   std::map<std::string, std::string> left_out_for;  // covariate: why runs are left out for it
   std::vector<std::string> left_out;                // "run: reason", and what else is wrong with runs
-  std::map<int, std::string> unmeasured;  // rotor, from 0, without a thrust in some runs: why, as said there
+  std::vector<std::string> unmeasured;              // of these, a rotor without a thrust in some runs
 
   /// v = b + g T of a cell, a linear baseline that is over what it is loaded with: what it reads without a
   /// load is no force. A thrust over a condition has none.
