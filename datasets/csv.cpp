@@ -26,8 +26,14 @@ std::string_view trimmed(std::string_view text) {
 /// A header that ends with CR alone would have all rows in it.
 void require_line_feeds(std::string_view text, const std::string& file) {
   const auto first = text.find('\r');
-  if (first < text.find('\n') && first + 1 < text.size() && text[first + 1] != '\n')
+  if (first >= text.find('\n') || first + 1 >= text.size() || text[first + 1] == '\n') return;
+  std::ptrdiff_t alone = 0;
+  for (auto at = first; at != std::string_view::npos; at = text.find('\r', at + 1))
+    alone += text.substr(at + 1, 1) == "\n" ? 0 : 1;
+  if (alone > std::ranges::count(text, '\n'))
     throw InputError::in(file, "its lines end with CR alone; save it with LF or CR LF");
+  throw InputError::in(file,
+                       "line 1 has a CR before its end; save it with LF or CR LF at the ends of lines alone");
 }
 
 /// Splits CSV text into records of cells; one call of `record` reads up to the end of one record.

@@ -108,7 +108,7 @@ class Page {
                                    {"evidence", drawn(ranked.evidence)},
                                    {"p", drawn(ranked.p)},
                                    {"parameter", amplitude.name},
-                                   {"unit", unit_of(observations_, amplitude)},
+                                   {"unit", unit_of(observations_, *ranked.term.effect, 0)},
                                    {"amplitude", drawn(ranked.amplitude)},
                                    {"standard_error", drawn(ranked.standard_error)}});
       }

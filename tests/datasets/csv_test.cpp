@@ -38,6 +38,8 @@ TEST(Csv, NamesFileLineAndColumnOfWhatIsWrong) {
   EXPECT_THAT(message_of([] { parse_csv("", "t.csv"); }), HasSubstr("t.csv:1: the file is empty"));
   EXPECT_THAT(message_of([] { parse_csv("a,b\r1,2\r3,4\r\n", "t.csv"); }),
               HasSubstr("t.csv: its lines end with CR alone"));
+  EXPECT_THAT(message_of([] { parse_csv("a,b\r (mV)\n1,2\n3,4\n", "t.csv"); }),
+              HasSubstr("t.csv: line 1 has a CR before its end"));
   EXPECT_THAT(message_of([] { parse_csv("a,a\n1,2\n", "t.csv"); }),
               testing::EndsWith("column a stands twice in the header"));
   EXPECT_THAT(

@@ -3,6 +3,10 @@
 #include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/observations/observations.h"
 
+#include <algorithm>
+#include <string>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -87,6 +91,44 @@ TEST(TableUnits, ACrosstalkCoefficientIsOfTheTwoUnits) {
   EXPECT_EQ(coefficient("gf"), "1");
   EXPECT_EQ(coefficient("mV"), "V/N");
   EXPECT_EQ(coefficient("mV/V"), "1/N");
+}
+
+/// Newtons among the axes are no newtons of the response.
+TEST(TableUnits, ACrosstalkCoefficientIsPrintedAsItIs) {
+  const auto printed = [](const std::string& load_unit) {
+    const std::string schema =
+        "format = \"tunnelrig-table/1\"\n[response]\ncolumn = \"y\"\nunit = \"counts\"\n"
+        "[[covariates]]\ncolumn = \"n\"\nunit = \"N\"\n[[covariates]]\ncolumn = \"k\"\nunit = \"" +
+        load_unit + "\"\n";
+    const Observations o =
+        observe_table(read_observations(parse_csv("y,n,k\n100,1,7\n102,2,3\n101,4,4\n", "t.csv"),
+                                        parse_table_schema(schema, "s.toml")),
+                      {.baseline = "linear:n"});
+    return unit_of(o, *TableEffects(o, {}).all.at(0), 0);
+  };
+  EXPECT_EQ(printed("N"), "1/N");
+  EXPECT_EQ(printed("N·m"), "1/(N·m)");
+}
+
+/// Of loads that hardly differ any slope is possible, but no cell that reads less the more it is loaded.
+TEST(TableUnits, ACellBendsByATenthAtMost) {
+  const auto most_bent = [](const std::string& csv, const std::string& baseline) {
+    const std::string schema =
+        "format = \"tunnelrig-table/1\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+        "[[covariates]]\ncolumn = \"n\"\nunit = \"N\"\n";
+    const Observations o =
+        observe_table(read_observations(parse_csv(csv, "t.csv"), parse_table_schema(schema, "s.toml")),
+                      {.baseline = baseline});
+    std::vector<const Effect*> every;
+    for (const Effect& effect : all_effects()) every.push_back(&effect);
+    const TableEffects effects(o, every);
+    const auto bent = std::ranges::find(effects.all, std::string("nonlinearity"),
+                                        [](const Effect* effect) { return effect->name; });
+    return (*bent)->parameters[0].upper;
+  };
+  const std::string csv = "y,n\n3.0,1\n3.1,2\n3.2,4\n";
+  EXPECT_NEAR(most_bent(csv, ""), 0.1 / 3.2, 1e-9);
+  EXPECT_NEAR(most_bent(csv, "linear:n"), 0.1 / 0.2, 1e-9) << "3 N without a load";
 }
 
 }  // namespace

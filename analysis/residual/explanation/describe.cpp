@@ -226,7 +226,16 @@ struct FittedCurve {
   Curve curve;
   VectorXd amplitude;
   MatrixXd covariance;
+  double beside_baseline = 1;  // share of its size that the groups' constants and slopes cannot make
 };
+
+/// Of what columns make, by its rms about the mean.
+double share_beside_baseline(const Observations& observations, const std::vector<int>& rows,
+                             const std::vector<Components>& columns, const VectorXd& amplitude) {
+  const MatrixXd made = stacked(columns, rows, observations.channels()) * amplitude;
+  const double whole = (made.array() - made.mean()).matrix().norm();
+  return whole > 0 ? std::min(1.0, beside_baseline(observations, rows, made).norm() / whole) : 1;
+}
 
 /// In one fit of all curves as they are drawn: together they are what the model says.
 FittedCurve fit_as_drawn(const Observations& observations, const JointFit& fit, const Curve& found,
@@ -252,6 +261,9 @@ FittedCurve fit_as_drawn(const Observations& observations, const JointFit& fit, 
   const auto k = static_cast<Index>(result.curve.columns.size());
   result.amplitude = all.amplitude.segment(first, k);
   result.covariance = all.covariance.block(first, first, k, k);
+  if (found.x.size() > 0)
+    result.beside_baseline =
+        share_beside_baseline(observations, rows, result.curve.columns, result.amplitude);
   return result;
 }
 
@@ -322,6 +334,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
     if (!fitted.curve.strength) centre(points);
     draw(points, fitted, observations.response_per_y(), t, result);
   }
+  result.beside_baseline = fitted.beside_baseline * result.amplitude;
   return result;
 }
 
@@ -360,7 +373,7 @@ UnknownStructure describe_sessions(const Observations& observations, const Matri
     lowest = std::min(lowest, mean);
     highest = std::max(highest, mean);
   }
-  result.amplitude = (highest - lowest) / 2;
+  result.amplitude = result.beside_baseline = (highest - lowest) / 2;
   return result;
 }
 

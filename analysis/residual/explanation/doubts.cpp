@@ -25,7 +25,7 @@ void warn_of_bounds(const Observations& observations, const Attribution& found, 
     const Effect& effect = *beyond.term.effect;
     if (!said.insert(effect.name).second) continue;
     const EffectParameter& amplitude = effect.parameters[0];
-    const std::string own = unit_of(observations, amplitude), unit = own == "1" ? "" : " " + own;
+    const std::string own = unit_of(observations, effect, 0), unit = own == "1" ? "" : " " + own;
     explanation.warnings.push_back(fmt::format(
         "of all candidates {} fitted best by far, but its {} would be {:.3g}{}, and its physical bounds are "
         "{:.3g} to {:.3g}{}: it is not named, and what is found beside it may be its work",

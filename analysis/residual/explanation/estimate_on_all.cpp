@@ -27,7 +27,7 @@ void report_adopted(const Observations& observations, const Attribution& found, 
       adopted.at_bound = !are_within_bounds(groups, amplitude);  // what joined it later may have moved them
     }
     for (std::size_t k = 0; k < adopted.parameters.size(); ++k)
-      adopted.parameters[k].unit = unit_of(observations, adopted.term.effect->parameters[k]);
+      adopted.parameters[k].unit = unit_of(observations, *adopted.term.effect, k);
     for (const Ranked& rival : accepted.confounded)
       adopted.confounded_with.push_back(rival.term.effect->cause());
     if (!accepted.confounded.empty())

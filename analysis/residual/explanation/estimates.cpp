@@ -210,7 +210,9 @@ ParameterEstimate summary_of_groups(const EffectParameter& parameter, std::vecto
   return result;
 }
 
-std::string unit_of(const Observations& observations, const EffectParameter& parameter) {
+std::string unit_of(const Observations& observations, const Effect& effect, std::size_t k) {
+  const EffectParameter& parameter = effect.parameters[k];
+  if (effect.form_is_axis) return parameter.unit;  // made of the table's own units
   if (observations.from_table && parameter.per_newton())
     return observations.unit == "1" ? "1" : "1/" + observations.unit;
   if (!parameter.in_volts() || (observations.newtons_per_volt.array() != 1).any()) return parameter.unit;

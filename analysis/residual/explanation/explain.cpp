@@ -1,8 +1,12 @@
 // The protocol done again without what it showed to be wrong: gross rows, conditions far from all others.
 #include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/explanation/seal.h"
 #include "analysis/residual/likelihood/scores.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <set>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -21,6 +25,10 @@ std::vector<int> rows_but(const Observations& observations, const std::vector<Su
         }))
       rows.push_back(r);
   return rows;
+}
+
+const std::string& block_of(const Observations& observations, int row) {
+  return observations.block_name[static_cast<std::size_t>(observations.block[static_cast<std::size_t>(row)])];
 }
 
 /// What is left of the rows, and what is not.
@@ -88,6 +96,24 @@ void warn_of_half_blocks(const Observations& observations, const SetAside& aside
           "{} of the {} rows of block {} are set aside, and the rest is likely as wrong: leave the block out",
           gone, places.size(), observations.block_name[static_cast<std::size_t>(block)]));
   }
+}
+
+/// The sealed rows that are set aside are in no error, which is smaller for it.
+void warn_of_sealed_rows(const SetAside& aside, std::uint64_t seed, std::vector<std::string>& said) {
+  const Observations& all = aside.all;
+  std::set<std::string> sealed;  // blocks
+  if (all.held_out.empty())
+    for (const int row : seal_blocks(aside.kept, seed).sealed) sealed.insert(block_of(aside.kept, row));
+  const auto count = std::ranges::count_if(aside.rows, [&](const SuspectRow& row) {
+    const int place = place_of(all, row.row);
+    return all.held_out.empty() ? sealed.contains(block_of(all, place))
+                                : static_cast<bool>(all.held_out[static_cast<std::size_t>(place)]);
+  });
+  if (count > 0)
+    said.push_back(fmt::format(
+        "{} of the {} that are set aside {} held out: the errors before and after are "
+        "without {}",
+        count, all.from_table ? "rows" : "runs", count == 1 ? "is" : "are", count == 1 ? "it" : "them"));
 }
 
 std::string in_words(const IsolatedValue& value, const char* what) {
@@ -202,6 +228,7 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
     said.emplace_back(
         "the sealed blocks had a part in what is adopted: their error after is no longer one of "
         "blocks that nobody has looked at");
+  if (explanation.verdict != "insufficient") warn_of_sealed_rows(aside, settings.seed, said);
   explanation.warnings.insert(explanation.warnings.begin(), said.begin(), said.end());
   explanation.suspect_rows.insert(explanation.suspect_rows.begin(), aside.rows.begin(), aside.rows.end());
   return explanation;

@@ -71,7 +71,8 @@ struct UnknownStructure {
   std::string times;           // the other condition that its slope goes with; empty: none
   int rotor = -1;
   double p_value = 1;
-  double amplitude = 0;  // half of peak to peak, unit of the response
+  double amplitude = 0;        // half of peak to peak, unit of the response
+  double beside_baseline = 0;  // what of it is left where the baseline has taken what it can make as well
   std::vector<ShapePoint> shape;
   bool levels = false;                      // the shape is one of few values, and nothing lies between them
   std::vector<std::string> labels;          // of a column of texts: x = i + 1 stands for labels[i]
@@ -172,9 +173,9 @@ Explanation explain(const Observations& observations, const std::vector<const Ef
 /// The rows that the explanation's model and residuals are of, with the scatter that they were found to have.
 Observations without_set_aside(const Observations& observations, const Explanation& explanation);
 
-/// A parameter's unit on these data: without a calibration there are no volts, and what would be volts is in
-/// the response's unit.
-std::string unit_of(const Observations& observations, const EffectParameter& parameter);
+/// The unit of an effect's parameter k on these data: without a calibration there are no volts, and what
+/// would be volts is in the response's unit.
+std::string unit_of(const Observations& observations, const Effect& effect, std::size_t k);
 
 /// The setting that tells the fit's term `t` from `rival` best, among conditions the rig has nearly seen.
 std::optional<SeparatingRun> separating_run(const Observations& observations, const JointFit& fit,

@@ -65,6 +65,7 @@ Json unknown_json(const UnknownStructure& unknown) {
           {"rotor", rotor_json(unknown.rotor)},
           {"p_value", finite(unknown.p_value)},
           {"amplitude", finite(unknown.amplitude)},
+          {"beside_baseline", finite(unknown.beside_baseline)},
           {"shape", shape},
           {"labels", unknown.labels},
           {"instead_of", unknown.instead_of},

@@ -1,9 +1,11 @@
 #include "analysis/residual/explanation/explanation_output.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <set>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -30,9 +32,19 @@ std::string place_in_words(const std::string& place) {
   return fmt::format("in proportion to {} of the location; drawn as it is at {} = 1", place, place);
 }
 
+/// The amplitudes of the groups that tell one: of the others the interval is wider than physics.
+std::vector<GroupEstimate> telling(const std::vector<GroupEstimate>& groups, const EffectParameter& bounds) {
+  std::vector<GroupEstimate> result;
+  std::ranges::copy_if(groups, std::back_inserter(result), [&](const GroupEstimate& group) {
+    return group.high - group.low < bounds.upper - bounds.lower;
+  });
+  return result.empty() ? groups : result;
+}
+
 std::string parameters_in_words(const AdoptedEffect& adopted) {
   std::string text;
-  for (const ParameterEstimate& parameter : adopted.parameters) {
+  for (std::size_t k = 0; k < adopted.parameters.size(); ++k) {
+    const ParameterEstimate& parameter = adopted.parameters[k];
     const bool plain = parameter.unit == "1" || !parameter.run.empty();
     text +=
         fmt::format("{}{} = {}{} [{:.4g}, {:.4g}]{}", text.empty() ? "" : ", ", parameter.name,
@@ -41,11 +53,12 @@ std::string parameters_in_words(const AdoptedEffect& adopted) {
                     plain ? "" : " " + parameter.unit, parameter.low, parameter.high,
                     parameter.theory ? " (theory)" : "");
     if (parameter.groups.empty()) continue;
-    const auto [least, most] =
-        std::minmax_element(parameter.groups.begin(), parameter.groups.end(),
-                            [](const GroupEstimate& a, const GroupEstimate& b) { return a.value < b.value; });
+    const std::vector<GroupEstimate> groups = telling(parameter.groups, adopted.term.effect->parameters[k]);
+    const auto [least, most] = std::ranges::minmax_element(groups, {}, &GroupEstimate::value);
     text += fmt::format(", the median of {} groups from {:.4g} ({}) to {:.4g} ({})", parameter.groups.size(),
                         least->value, least->group, most->value, most->group);
+    if (groups.size() < parameter.groups.size())
+      text += fmt::format("; {} tell nothing", parameter.groups.size() - groups.size());
   }
   return text;
 }
@@ -122,6 +135,7 @@ std::string could_be_in_words(const UnknownStructure& u) {
 }
 
 std::string in_words(const UnknownStructure& u, const Explanation& explanation) {
+  constexpr double kLittle = 0.5;
   const std::string unit = explanation.unit_suffix();
   const bool relative = explanation.relative_to > 0 && u.covariate != "session";
   const bool plain = u.covariate_unit.empty() || u.covariate_unit == "1";
@@ -130,6 +144,9 @@ std::string in_words(const UnknownStructure& u, const Explanation& explanation) 
       plain ? "" : " [" + u.covariate_unit + "]", u.times.empty() ? "" : " × " + u.times,
       u.rotor < 0 ? "" : fmt::format(" of rotor {}", u.rotor + 1), u.amplitude, unit,
       relative ? fmt::format(" ({:.3g} %)", 100 * u.amplitude / explanation.relative_to) : "", u.p_value);
+  if (u.beside_baseline < kLittle * u.amplitude)
+    text +=
+        fmt::format("    the baseline could make all but {:.3g}{} of it as well\n", u.beside_baseline, unit);
   if (!u.place.empty()) text += fmt::format("    {}\n", place_in_words(u.place));
   if (!u.times.empty())
     text += fmt::format(

@@ -219,6 +219,16 @@ Fitted names_alone(const Models& models, const std::vector<int>& open) {
   return better_of(with_scatter(wide.scatter), with_scatter({}), open);
 }
 
+/// Where few blocks make the whole error, it has no interval.
+void warn_of_interval(const ErrorEstimate& estimate, const char* which, Explanation& explanation) {
+  constexpr double kSaysNothing = 30;  // its upper end over its lower
+  if (estimate.held_out_high > kSaysNothing * estimate.held_out_low)
+    explanation.warnings.push_back(
+        fmt::format("the blocks differ so much in the size of their errors that the interval of the error {} "
+                    "says nothing: few of them make all of it",
+                    which));
+}
+
 /// The seal is opened: nothing that was decided before changes any more. Curves have no name, so they are not
 /// part of "after" unless they are asked for.
 void open_seal(const Models& models, const Seal& seal, const SearchSettings& settings,
@@ -243,6 +253,8 @@ void open_seal(const Models& models, const Seal& seal, const SearchSettings& set
   };
   with_interval(before, baseline, explanation.before);
   with_interval(after, shown, explanation.after);
+  warn_of_interval(explanation.before, "before", explanation);
+  if (all_shown || !found.accepted.empty()) warn_of_interval(explanation.after, "after", explanation);
   const HeldOutErrors whole = all_shown ? after : errors(all_found);
   explanation.suspect_rows = apart_from_their_block(alone, found.final.model, whole);
   HeldOutErrors curves = before;

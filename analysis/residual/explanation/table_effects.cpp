@@ -16,13 +16,19 @@ struct OtherAxis {
   }
 };
 
+std::string as_divisor(const std::string& unit) {
+  return unit.find_first_of("/*") == std::string::npos && unit.find("·") == std::string::npos
+             ? unit
+             : "(" + unit + ")";
+}
+
 /// Crosstalk from a table's other axes, as candidates of their own.
 std::vector<Effect> other_axes(const Observations& observations) {
   std::vector<Effect> effects;
   for (const std::string& axis : observations.other_axes) {
     const Covariate* load = observations.find(axis);
     const bool same = load == nullptr || load->unit == observations.unit;
-    const std::string unit = same ? "1" : observations.unit + "/" + load->unit;
+    const std::string unit = same ? "1" : observations.unit + "/" + as_divisor(load->unit);
     effects.push_back(make_effect<OtherAxis>({.name = "crosstalk",
                                               .form = axis,
                                               .formula = "F + x F_other",
@@ -46,18 +52,22 @@ void bound_by(double limit, EffectParameter& parameter) {
 /// With the bounds that hold for this table's response, where they are others. What a drift of the zero can
 /// be is known of volts: in counts or newtons it depends on the converter and the cell, and only the sign is
 /// left. An offset larger than all that was read is none: over the few speeds of one setting any would do. A
-/// cell that bends by more than a tenth over its range is none.
+/// cell that bends by more than a tenth from no load to its largest is none.
 std::optional<Effect> bounded_as_here(const Effect& effect, const Observations& observations) {
   constexpr double kNoBound = 1e12, kMostBent = 0.1;
   const double most_read = observations.value.cwiseAbs().maxCoeff();
+  double lowest = observations.value.minCoeff(), highest = observations.value.maxCoeff();
+  if (!observations.line_of_cell) {  // whose reading without a load is no force
+    lowest = std::min(lowest, 0.0);
+    highest = std::max(highest, 0.0);
+  }
   Effect own = effect;
   bool differs = false;
   for (EffectParameter& parameter : own.parameters) {
     const bool in_volts = parameter.in_volts() && observations.unit != "V";
     const bool per_newton = parameter.per_newton();
     if (in_volts) bound_by(effect.origin == EffectOrigin::kOffset ? most_read : kNoBound, parameter);
-    if (per_newton)
-      bound_by(kMostBent / (observations.value.maxCoeff() - observations.value.minCoeff()), parameter);
+    if (per_newton) bound_by(kMostBent / (highest - lowest), parameter);
     differs |= in_volts || per_newton;
   }
   if (!differs) return {};

@@ -92,10 +92,22 @@ bool another_does_as_well(const SearchData& data, const Found& found, const Cros
   return false;
 }
 
+/// Whether groups that see a step have rows before it: to the others it is an offset, of which no time is
+/// known.
+bool begins_within_groups(const Observations& observations, const std::vector<int>& rows) {
+  const Eigen::VectorXd step = observations.slopes.rightCols<1>();
+  return std::ranges::all_of(rows_of_each(observations.group, rows), [&](const auto& group) {
+    return std::ranges::any_of(group.second, [&](int row) { return step(row) == 0; });
+  });
+}
+
 /// Whether they predict unseen blocks better, within the bounds of physics.
 bool are_better(const SearchData& data, const Found& found, const InGroups& own, bool before_others) {
   const JointFit& fit = own.fit;
   if (!fit.at_bound.empty()) return false;
+  if (fit.model.terms.back().effect->has_change_point() &&
+      !begins_within_groups(own.observations, data.rows()))
+    return false;
   const CrossValidation after = unseen(data, own.observations, fit, fit.variances);
   const CrossValidation before = unseen(data, found.fit, fit.variances);
   const LossDifference gain = compare(before, after);

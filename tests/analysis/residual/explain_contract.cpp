@@ -93,10 +93,13 @@ void expect_contract(const Explanation& explanation) {
     }
   }
   for (const json& unknown : written["unknown"]) {
-    for (const char* key : {"covariate", "covariate_unit", "place", "times", "rotor", "p_value", "amplitude",
-                            "shape", "labels", "instead_of", "collinear_with", "by_sealed_too", "could_be"})
+    for (const char* key :
+         {"covariate", "covariate_unit", "place", "times", "rotor", "p_value", "amplitude", "beside_baseline",
+          "shape", "labels", "instead_of", "collinear_with", "by_sealed_too", "could_be"})
       EXPECT_TRUE(unknown.contains(key)) << key;
     for (const json& point : unknown["shape"]) EXPECT_EQ(point.size(), 4u);
+    EXPECT_GT(unknown["beside_baseline"], 0);
+    EXPECT_LE(unknown["beside_baseline"], unknown["amplitude"]);
   }
   for (const json& untestable : written["untestable"]) {
     EXPECT_TRUE(untestable.contains("effect"));

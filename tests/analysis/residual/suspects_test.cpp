@@ -1,6 +1,7 @@
 // Runs whose conditions were mistyped, and rows whose responses were.
 #include "analysis/residual/explanation/explanation_output.h"
 #include "analysis/residual/explanation/explanation_parts.h"
+#include "analysis/residual/explanation/seal.h"
 #include "analysis/residual/simulated.h"
 #include "analysis/residual/tables.h"
 #include "support/seeds.h"
@@ -123,6 +124,44 @@ TEST_F(GrossRowsTest, AreNotTakenForScatterThatGoesWithTheSpeed) {
   const Explanation e = explained();
   EXPECT_THAT(set_aside(e), UnorderedElementsAreArray(lines)) << explanation_text(e);
   EXPECT_EQ(e.adopted.size(), 1u) << explanation_text(e);
+}
+
+/// An error that leaves some of the rows out that were held out for it says so.
+TEST_F(GrossRowsTest, OfSealedBlocksAreSaidToBeInNoError) {
+  int with = 0;
+  for (const double wrong : {1.5, 1.7, 2.0, 3.0}) {
+    lines.clear();
+    write_thrusts({wrong});
+    const Explanation e = explained();
+    ASSERT_THAT(set_aside(e), UnorderedElementsAreArray(lines)) << explanation_text(e);
+    const int block = (std::stoi(lines[0].substr(lines[0].find(':') + 1)) - 2) % 12;
+    csv = csv.substr(0, csv.find('\n') + 1);  // the same blocks, whose rows do not matter
+    for (int r = 0; r < 96; ++r) csv += fmt::format("{},{},{}\n", r % 12, 2000 + r, 1 + r % 3);
+    const Observations o = observed(csv, "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n");
+    const std::vector<int> sealed = seal_blocks(o, test::quick().seed).sealed;
+    const bool is_sealed = std::ranges::any_of(sealed, [&](int row) { return row % 12 == block; });
+    const auto said = Contains(HasSubstr("1 of the rows that are set aside is held out"));
+    if (is_sealed)
+      EXPECT_THAT(e.warnings, said);
+    else
+      EXPECT_THAT(e.warnings, testing::Not(said));
+    with += is_sealed ? 1 : 0;
+  }
+  EXPECT_GT(with, 0);
+}
+
+/// An error that one block makes has no interval.
+TEST_F(GrossRowsTest, OfAWildBlockMakeNoInterval) {
+  const auto explained_with = [&](double wild) {
+    csv = "b,y\n";
+    for (int r = 0; r < 80; ++r)
+      csv += fmt::format("{},{}\n", r / 10, 5 + 0.01 * scatter(random) * std::pow(wild, r / 10));
+    return test::explained(observed(csv, "blocks = \"b\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"));
+  };
+  const auto said = Contains(HasSubstr("the interval of the error before says nothing"));
+  const Explanation calm = explained_with(1), wild = explained_with(6);
+  EXPECT_THAT(calm.warnings, testing::Not(said));
+  EXPECT_THAT(wild.warnings, said) << explanation_text(wild);
 }
 
 TEST_F(GrossRowsTest, AreAllSetAsideWhereEachHidesTheNext) {

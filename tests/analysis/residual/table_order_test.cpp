@@ -100,5 +100,26 @@ TEST_F(TableOrderTest, AStepWithAmplitudesOfTheGroupsOwnIsPlacedByAllOfThem) {
   }
 }
 
+/// To a file that begins behind a step it is a tare, of which nobody knows when it came.
+TEST_F(TableOrderTest, AStepOfTheGroupsOwnHasEachOfThemOnBothSides) {
+  constexpr std::array<double, 4> kTare_N = {0, 0, 0.6, 0.5};
+  std::string csv = "file,order,rpm,y\n";
+  for (int r = 0; r < 240; ++r) {
+    const auto file = static_cast<std::size_t>(r / 60);
+    const double rpm = 2000 + 6000 * even(random);
+    const double tare_N = r >= 90 && r < 120 ? 0.4 : kTare_N[file];
+    csv += fmt::format("{},{},{},{}\n", file, r, rpm,
+                       6 * std::pow(rpm / 6000, 2) + tare_N + 0.01 * scatter(random));
+  }
+  const Explanation e = explained(
+      observed(csv,
+               "groups = [\"file\"]\nblocks = \"bins(order, 24)\"\n[response]\ncolumn = \"y\"\nunit = \"N\"\n"
+               "meaning = \"thrust_N\"\n[speed]\ncolumn = \"rpm\"\nunit = \"rpm\"\n[propeller]\n"
+               "diameter_m = 0.2\n[[covariates]]\ncolumn = \"order\"\nmeaning = \"run_order\"\n"));
+  ASSERT_EQ(names(e), "mounting_step zero_offset ") << explanation_text(e);
+  EXPECT_FALSE(e.adopted[0].term.per_group);
+  EXPECT_TRUE(e.adopted[1].term.per_group);
+}
+
 }  // namespace
 }  // namespace tunnelrig
