@@ -16,12 +16,20 @@ MeanModel with_change_points_of_all(Observations& observations, MeanModel model,
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const auto k = model.terms[t].effect->change_point();
     if (!k) continue;
-    const StepProfile profile = step_profile(observations, model, t, rows);
+    const std::vector<int> sought = rows_where_a_step_may_begin(observations, rows);
+    const StepProfile profile = step_profile(observations, model, t, rows, sought);
     if (profile.empty()) continue;
+    int low = profile.lowest(), high = profile.highest();
+    if (low == sought.front() || high == sought.back()) {  // it may lie where none is sought
+      const StepProfile anywhere =
+          step_profile(observations, model, t, rows, rows_where_a_step_may_lie(observations, rows));
+      low = std::min(low, anywhere.lowest());
+      high = std::max(high, anywhere.highest());
+    }
     if (model.terms[t].per_group && profile.likeliest() != first_row_of(model.terms[t]))
       model = fit_with_parameter(*k, profile.likeliest(), observations, std::move(model), t, rows).model;
     model.terms[t].parameters[*k] = profile.likeliest();
-    result.push_back({t, *k, static_cast<double>(profile.lowest()), static_cast<double>(profile.highest())});
+    result.push_back({t, *k, static_cast<double>(low), static_cast<double>(high)});
   }
   return model;
 }

@@ -71,6 +71,14 @@ std::vector<int> rows_where_a_step_may_begin(const Observations& observations, c
   return result;
 }
 
+std::vector<int> rows_where_a_step_may_lie(const Observations& observations, const std::vector<int>& rows) {
+  const std::vector<int> beside = runs_beside(observations, rows);
+  std::vector<int> result;
+  for (std::size_t place = 0; place < rows.size(); ++place)
+    if (beside[place] > 0) result.push_back(rows[place]);
+  return result;
+}
+
 std::vector<Term> ways_to_try(const Effect& effect, const Observations& observations,
                               const std::vector<int>& rows) {
   std::vector<Term> ways = {

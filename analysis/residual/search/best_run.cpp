@@ -12,7 +12,8 @@ Placed at_best_run(const Observations& observations, JointFit fit, std::size_t f
   const std::size_t t = fit.model.terms.size() - from_newest;
   const Term& step = fit.model.terms[t];
   if (!step.effect->has_change_point()) return {std::move(fit)};
-  const StepProfile profile = step_profile(observations, fit.model, t, rows);
+  const StepProfile profile =
+      step_profile(observations, fit.model, t, rows, rows_where_a_step_may_begin(observations, rows));
   if (profile.empty() || profile.likeliest() == first_row_of(step)) return {std::move(fit)};
   if (step.per_group) {
     Observations moved = observations;

@@ -98,10 +98,9 @@ int StepProfile::end_of_interval(bool highest) const {
 }
 
 StepProfile step_profile(const Observations& given, const MeanModel& model, std::size_t t,
-                         const std::vector<int>& rows) {
+                         const std::vector<int>& rows, const std::vector<int>& possible) {
   constexpr std::ptrdiff_t kAtOnce = 32;
   constexpr double kClearlyNot = 3 * kStepInterval;  // beyond it a profile hardly comes back
-  const std::vector<int> possible = rows_where_a_step_may_begin(given, rows);
   StepProfile profile;
   if (possible.empty()) return profile;
   StepLikelihoods evaluate(given, model, t, rows);

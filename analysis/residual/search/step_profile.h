@@ -27,11 +27,11 @@ struct StepProfile {
   int end_of_interval(bool highest) const;
 };
 
-/// Of term t of a model, whose change-point is at a row that was found, by these rows; it leaves
-/// kLeastBlocksBesideAStep of their blocks on either side. The rest of the model is linear about its
-/// parameters, all amplitudes and variances are fitted anew. Empty where no row is possible.
+/// Of term t of a model, whose change-point is at a row that was found, by these rows; it begins at one of
+/// `possible`. The rest of the model is linear about its parameters, all amplitudes and variances are fitted
+/// anew. Empty where no row is possible.
 StepProfile step_profile(const Observations& observations, const MeanModel& model, std::size_t t,
-                         const std::vector<int>& rows);
+                         const std::vector<int>& rows, const std::vector<int>& possible);
 
 /// The row from which a term that is a step is there.
 int first_row_of(const Term& step);

@@ -129,11 +129,35 @@ TEST_F(Intervals, OfAStepsFirstRunHoldIt) {
       const int first = std::uniform_int_distribution<int>(40, 120)(random);
       test::add_effect(o, "propeller_step", {size * kSigma, static_cast<double>(first)});
       const Term beside{.effect = &test::effect_named("propeller_step"), .parameters = {0, first + 3.0}};
-      const StepProfile profile = step_profile(o, {{beside}, {}}, 0, o.all_rows());
+      const StepProfile profile =
+          step_profile(o, {{beside}, {}}, 0, o.all_rows(), rows_where_a_step_may_begin(o, o.all_rows()));
       ASSERT_FALSE(profile.empty());
       held += profile.lowest() <= first && first <= profile.highest() ? 1 : 0;
     }
     EXPECT_GT(held, 0.91 * kSamples) << size << " sigma";
+  }
+}
+
+/// A twentieth of the runs is too few to look for a step behind them, and no reason to say that it was later.
+TEST_F(Intervals, OfAStepsFirstRunReachWhereNoneIsSought) {
+  constexpr double kSigma = 0.002;
+  constexpr int kFirst = 5;
+  for (const bool at_end : {false, true}) {
+    Observations o = test::simulate(
+        {.runs_of_block = std::vector<int>(160, 1), .groups = 1, .sigma = kSigma, .session_ratio = 0},
+        random);
+    o.blocks_are_rows = true;
+    o.covariates.push_back({"run_order", Eigen::VectorXd::LinSpaced(o.rows(), 0, 159), true});
+    const int first = at_end ? 160 - kFirst : kFirst;
+    test::add_effect(o, "propeller_step", {8 * kSigma, static_cast<double>(first)});
+    const Term beside{.effect = &test::effect_named("propeller_step"),
+                      .parameters = {0, at_end ? first - 10.0 : first + 10.0}};
+    std::vector<Profiled> steps;
+    with_change_points_of_all(o, {{beside}, {}}, steps);
+    ASSERT_EQ(steps.size(), 1u);
+    EXPECT_LE(steps[0].low, first);
+    EXPECT_GE(steps[0].high, first);
+    EXPECT_LT(steps[0].high - steps[0].low, 10);
   }
 }
 
