@@ -58,7 +58,7 @@ std::string parameters_in_words(const AdoptedEffect& adopted) {
     text += fmt::format(", the median of {} groups from {:.4g} ({}) to {:.4g} ({})", parameter.groups.size(),
                         least->value, least->group, most->value, most->group);
     if (groups.size() < parameter.groups.size())
-      text += fmt::format("; {} tell nothing", parameter.groups.size() - groups.size());
+      text += fmt::format("; of {} nothing is known", parameter.groups.size() - groups.size());
   }
   return text;
 }

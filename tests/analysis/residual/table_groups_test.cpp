@@ -18,6 +18,21 @@ using test::kMiddle_V;
 using test::TablesTest;
 using testing::HasSubstr;
 
+/// Two speeds of a propeller tell no exponent, whatever they make of one: of 603 there is nothing to say.
+TEST(GroupsInWords, ThoseThatTellNothingAreCounted) {
+  AdoptedEffect adopted;
+  adopted.term = {.effect = &test::effect_named("reynolds_number"), .per_group = true};
+  adopted.term.parameters = {0.1};
+  ParameterEstimate exponent;
+  exponent.name = "exponent";
+  exponent.groups = {{"a", 0.1, 0.05, 0.15}, {"b", 603, -495, 1702}, {"c", 0.2, 0.1, 0.3}};
+  adopted.parameters = {exponent};
+  Explanation e;
+  e.adopted = {adopted};
+  EXPECT_THAT(explanation_text(e),
+              HasSubstr("the median of 3 groups from 0.1 (a) to 0.2 (c); of 1 nothing is known"));
+}
+
 /// Six cells in the same weather, of which one drifts up and another down: nothing that all have in common.
 TEST_F(TablesTest, DriftsOfEitherSignAreFoundInEachGroup) {
   constexpr std::array<double, 6> kDrift_V_K = {2e-6, -1.5e-6, 0.6e-6, -1.8e-6, 1.4e-6, -0.7e-6};
