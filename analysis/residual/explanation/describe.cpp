@@ -226,7 +226,7 @@ struct FittedCurve {
   Curve curve;
   VectorXd amplitude;
   MatrixXd covariance;
-  double beside_baseline = 1;  // share of its size that the groups' constants and slopes cannot make
+  double own_share = 1;  // of its size, that the groups' constants and slopes cannot make
 };
 
 /// Of what columns make, by its rms about the mean.
@@ -262,8 +262,7 @@ FittedCurve fit_as_drawn(const Observations& observations, const JointFit& fit, 
   result.amplitude = all.amplitude.segment(first, k);
   result.covariance = all.covariance.block(first, first, k, k);
   if (found.x.size() > 0)
-    result.beside_baseline =
-        share_beside_baseline(observations, rows, result.curve.columns, result.amplitude);
+    result.own_share = share_beside_baseline(observations, rows, result.curve.columns, result.amplitude);
   return result;
 }
 
@@ -334,7 +333,7 @@ UnknownStructure describe(const Observations& observations, const JointFit& fit,
     if (!fitted.curve.strength) centre(points);
     draw(points, fitted, observations.response_per_y(), t, result);
   }
-  result.beside_baseline = fitted.beside_baseline * result.amplitude;
+  result.beside_baseline = fitted.own_share * result.amplitude;
   return result;
 }
 

@@ -111,9 +111,8 @@ void warn_of_sealed_rows(const SetAside& aside, std::uint64_t seed, std::vector<
   });
   if (count > 0)
     said.push_back(fmt::format(
-        "{} of the {} that are set aside {} held out: the errors before and after are "
-        "without {}",
-        count, all.from_table ? "rows" : "runs", count == 1 ? "is" : "are", count == 1 ? "it" : "them"));
+        "{} of the {} that are set aside {} held out: the errors before and after are without {}", count,
+        all.from_table ? "rows" : "runs", count == 1 ? "is" : "are", count == 1 ? "it" : "them"));
 }
 
 std::string in_words(const IsolatedValue& value, const char* what) {
